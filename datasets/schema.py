@@ -1,0 +1,149 @@
+"""Arrow schemas of the tables. Units are in the names, meanings in the fields' metadata; the dictionary is made from them."""
+
+from __future__ import annotations
+
+import pyarrow as pa
+
+SCHEMA_VERSION = "1"
+MEANING = b"meaning"
+
+_STATUS = "ok, or the reason of failure; a failed row keeps its place with NaN"
+
+
+def _field(name: str, kind: pa.DataType, meaning: str) -> pa.Field:
+    return pa.field(name, kind, metadata={MEANING: meaning.encode()})
+
+
+def _floats(meanings: dict[str, str]) -> list[pa.Field]:
+    return [_field(name, pa.float64(), meaning) for name, meaning in meanings.items()]
+
+
+_POSE = _floats(
+    {f"q_{axis}": f"{axis} of the unit quaternion of cam_from_obj, w >= 0" for axis in "wxyz"}
+    | {f"t_{axis}_mm": f"{axis} of the object frame's origin in the camera frame" for axis in "xyz"}
+)
+_IMAGE = pa.struct([pa.field("bytes", pa.binary()), pa.field("path", pa.string())])
+_KEY = [
+    _field("frame_id", pa.int64(), "frame"),
+    _field("solver", pa.string(), "solver that made the estimate"),
+    _field("points", pa.string(), "image points it was given: detected, truth, or truth with noise"),
+    _field("camera", pa.string(), "camera it assumed: exact, nominal or paper"),
+    _field("use", pa.string(), "object points it used: four or all"),
+    _field("draw", pa.int32(), "draw of the point noise; 0 where there is none"),
+]
+
+FRAMES = pa.schema(
+    [
+        _field("frame_id", pa.int64(), "frame, from 0"),
+        _field("pose_id", pa.int64(), "pose; frames of one pose differ by camera only"),
+        _field("time_s", pa.float64(), "time on the trajectory"),
+        _field("camera_name", pa.string(), "camera's name in the recipe"),
+        _field("lens", pa.string(), "lens law"),
+        _field("image", _IMAGE, "8-bit grey PNG"),
+        *_POSE,
+        *_floats(
+            {
+                "fx_px": "true focal length along x",
+                "fy_px": "true focal length along y",
+                "cx_px": "true principal point, pixel centres at integers",
+                "cy_px": "true principal point, pixel centres at integers",
+                **{f"k{i}": f"coefficient {i} of kannala_brandt, else 0" for i in range(1, 5)},
+                "nominal_f_px": "focal length that a user without calibration assumes",
+                "tilt_deg": "angle between the board's normal and the optical axis",
+            }
+        ),
+        *(_field(name, pa.int32(), meaning) for name, meaning in (
+            ("width_px", "image width"),
+            ("height_px", "image height"),
+            ("region_x_px", "left edge of the rendered region"),
+            ("region_y_px", "top edge of the rendered region"),
+            ("region_width_px", "width of the rendered region"),
+            ("region_height_px", "height of the rendered region"),
+        )),
+        _field("render_seed", pa.int64(), "seed of the subpixel positions"),
+        _field("master", pa.string(), "path of the linear-light EXR within the dataset"),
+    ]
+)  # fmt: skip
+
+KEYPOINTS = pa.schema(
+    [
+        _field("frame_id", pa.int64(), "frame"),
+        _field("point_id", pa.int32(), "point: inner corners row by row, then the circle"),
+        *_floats(
+            {
+                "x_obj_mm": "x in the object frame",
+                "y_obj_mm": "y in the object frame",
+                "z_obj_mm": "z in the object frame, into the board",
+                "x_px": "true image of the point",
+                "y_px": "true image of the point",
+                "x_outline_px": "centroid of the projected outline: of the circle; a corner's is the corner",
+                "y_outline_px": "centroid of the projected outline: of the circle; a corner's is the corner",
+                "theta_deg": "incidence angle",
+            }
+        ),
+        _field("in_image", pa.bool_(), "whether the point lies on the picture"),
+    ]
+)
+
+DETECTIONS = pa.schema(
+    [
+        _field("frame_id", pa.int64(), "frame"),
+        _field("point_id", pa.int32(), "point, as in keypoints"),
+        *_floats({"x_px": "detected image of the point", "y_px": "detected image of the point"}),
+        _field("status", pa.string(), _STATUS),
+        _field("finder", pa.string(), "finder that saw the board; empty if none"),
+        _field("blur_px", pa.float64(), "median blur of the board's edges"),
+    ]
+)
+
+ESTIMATES = pa.schema(
+    [
+        *_KEY,
+        _field("status", pa.string(), _STATUS),
+        _field("n_points", pa.int32(), "points that the solver was given"),
+        *_POSE,
+        _field("iterations", pa.int32(), "iterations of start and refinement"),
+        _field("reprojection_rmse_px", pa.float64(), "root mean squared reprojection error, assumed camera"),
+    ]
+)
+
+SCORES = pa.schema(
+    [
+        *_KEY,
+        _field("status", pa.string(), _STATUS),
+        *_floats(
+            {
+                "rotation_error_deg": "angle between estimated and true rotation",
+                "rx_error_deg": "estimate minus truth about x, R = Rz Ry Rx",
+                "ry_error_deg": "estimate minus truth about y",
+                "rz_error_deg": "estimate minus truth about z",
+                "tx_error_mm": "estimate minus truth along x",
+                "ty_error_mm": "estimate minus truth along y",
+                "tz_error_mm": "estimate minus truth along z",
+                "t_error_relative": "length of the translation error over the true distance",
+                "reprojection_rmse_px": "root mean squared reprojection error, assumed camera",
+            }
+        ),
+        _field("star", pa.bool_(), "the paper's star: no solution, or a translation at least twice the true one"),
+    ]
+)
+
+TABLES: dict[str, pa.Schema] = {
+    "frames": FRAMES,
+    "keypoints": KEYPOINTS,
+    "detections": DETECTIONS,
+    "estimates": ESTIMATES,
+    "scores": SCORES,
+}
+
+
+def dictionary() -> str:
+    """The data dictionary as Markdown."""
+    lines: list[str] = []
+    for name, schema in TABLES.items():
+        lines += [f"### {name}", "", "| column | type | meaning |", "|---|---|---|"]
+        for field in schema:
+            meaning = (field.metadata or {}).get(MEANING, b"").decode()
+            lines.append(f"| `{field.name}` | {field.type} | {meaning} |")
+        lines.append("")
+    return "\n".join(lines)

@@ -1,0 +1,104 @@
+"""A central camera: a lens law, focal lengths and a principal point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from eposit.lens import Array, Lens, get_lens
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Camera:
+    """A central camera. Axes x right, y down, z forward; pixel centres at integer coordinates, as in OpenCV.
+
+    Raises:
+        ValueError: unknown lens, wrong coefficients, or a focal length or image size that is not positive.
+    """
+
+    lens: str  # one of eposit.LENS_NAMES
+    fx: float  # focal length along x, px
+    fy: float  # focal length along y, px
+    cx: float  # principal point, px
+    cy: float  # principal point, px
+    width: int  # image width, px
+    height: int  # image height, px
+    coefficients: tuple[float, ...] = ()  # k1..k4 of Kannala-Brandt, empty for the other lenses
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "coefficients", tuple(float(k) for k in self.coefficients))
+        for name in ("fx", "fy", "width", "height"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0):
+                raise ValueError(f"camera {name} is {value}; it must be a positive number of pixels")
+        for name in ("cx", "cy"):
+            if not np.isfinite(getattr(self, name)):
+                raise ValueError(f"camera {name} is {getattr(self, name)}; it must be a finite number of pixels")
+        get_lens(self.lens, self.coefficients)
+
+    @property
+    def law(self) -> Lens:
+        """The lens law behind the name."""
+        return get_lens(self.lens, self.coefficients)
+
+    def matrix(self) -> Array:
+        """(3, 3) intrinsic matrix, px."""
+        return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
+
+    def replace(self, **changes: Any) -> Self:
+        """A camera with some fields changed."""
+        return replace(self, **changes)
+
+    def project(self, points_in_cam: ArrayLike) -> Array:
+        """(..., 3) points, any unit, to (..., 2) px; NaN rows where the lens cannot see.
+
+        Raises:
+            ValueError: the last axis is not 3.
+        Source:
+            Paper, equations 1 to 5; Kannala and Brandt 2006 for the polynomial.
+        """
+        points = _last_axis(points_in_cam, 3, "points_in_cam")
+        x, y, z = np.moveaxis(points, -1, 0)
+        side = np.hypot(x, y)
+        radius = self.law.rho(_seen_angle(side, z))
+        on_axis = side == 0.0
+        scale = np.where(on_axis, 0.0, radius / np.where(on_axis, 1.0, side)) + 0.0 * radius
+        return np.stack((self.fx * x * scale + self.cx, self.fy * y * scale + self.cy), axis=-1)
+
+    def sees(self, points_in_cam: ArrayLike) -> NDArray[np.bool_]:
+        """(..., 3) points to a (...) mask: the lens gives the point an image (inside the picture or not)."""
+        points = _last_axis(points_in_cam, 3, "points_in_cam")
+        x, y, z = np.moveaxis(points, -1, 0)
+        return self.law.sees(_seen_angle(np.hypot(x, y), z))
+
+    def bearing(self, points_px: ArrayLike) -> Array:
+        """(..., 2) px to (..., 3) unit vectors in the camera frame; NaN rows where no ray reaches the pixel."""
+        pixels = _last_axis(points_px, 2, "points_px")
+        x = (pixels[..., 0] - self.cx) / self.fx
+        y = (pixels[..., 1] - self.cy) / self.fy
+        radius = np.hypot(x, y)
+        theta = self.law.theta(radius)
+        on_axis = radius == 0.0
+        scale = np.where(on_axis, 1.0, np.sin(theta) / np.where(on_axis, 1.0, radius))
+        return np.stack((x * scale, y * scale, np.cos(theta)), axis=-1)
+
+    def contains(self, points_px: ArrayLike) -> NDArray[np.bool_]:
+        """(..., 2) px to a (...) mask: the point lies on the picture's area. NaN does not."""
+        pixels = _last_axis(points_px, 2, "points_px")
+        u, v = pixels[..., 0], pixels[..., 1]
+        return (u >= -0.5) & (u <= self.width - 0.5) & (v >= -0.5) & (v <= self.height - 0.5)
+
+
+def _seen_angle(side: Array, z: Array) -> Array:
+    """Incidence angle, rad; NaN for the camera centre and on the backward axis, where no direction is defined."""
+    return np.where((side == 0.0) & (z <= 0.0), np.nan, np.arctan2(side, z))
+
+
+def _last_axis(values: ArrayLike, size: int, name: str) -> Array:
+    array = np.asarray(values, dtype=np.float64)
+    if array.ndim == 0 or array.shape[-1] != size:
+        raise ValueError(f"{name} has shape {array.shape}; its last axis must have length {size}")
+    return array

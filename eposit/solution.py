@@ -1,0 +1,45 @@
+"""What a solver returns: an expected failure is a status with a NaN pose, never an exception."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+
+from eposit.lens import Array
+from eposit.pose import Pose
+
+
+class Status(StrEnum):
+    """Outcome of one problem. Every value but OK comes with a NaN pose."""
+
+    OK = "ok"
+    NON_FINITE = "non_finite"  # an image point is NaN or infinite
+    OUTSIDE_LENS = "outside_lens"  # an image point that no ray of this lens reaches
+    FIELD_ANGLE = "field_angle"  # a point at or beyond 90 degrees, where POSIT and EPOSIT have no equations
+    COPLANAR = "coplanar"  # the points lie in one plane and the method cannot take that
+    NOT_CONVERGED = "not_converged"  # the iteration stopped before its step fell below the tolerance
+    INCONSISTENT = "inconsistent"  # converged, but to a pose that does not reproduce the image points
+
+
+STATUS_TYPE = np.dtype(f"<U{max(len(status) for status in Status)}")
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """Result of `solve` for one problem, or for a batch of b problems (then every field has a leading axis b)."""
+
+    status: Any  # a Status, or a (b,) array of their strings
+    cam_from_obj: Pose  # R (3, 3) and t (3,) in the unit of points_in_obj
+    iterations: Any  # of the linear start and the refinement together
+    reprojection_rmse_px: Any  # root of the mean squared distance between image points and reprojections, px
+    covariance: Array  # (6, 6): rotation vector on the left in the camera frame (rad), then t
+
+    def first(self) -> Solution:
+        """The single problem of a batch of one, without its leading axis."""
+        pose = Pose(self.cam_from_obj.R[0], self.cam_from_obj.t[0])
+        status, rmse = Status(str(self.status[0])), float(self.reprojection_rmse_px[0])
+        return Solution(status, pose, int(self.iterations[0]), rmse, self.covariance[0])
+

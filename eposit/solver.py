@@ -1,0 +1,191 @@
+"""`solve`: one entry for POSIT, EPOSIT, centred EPOSIT and the default method."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from eposit.camera import Camera
+from eposit.lens import Array
+from eposit.pose import Pose
+from eposit.posit import COPLANAR_CONDITION, Start, condition, posit_checked, rectify_bearings, rectify_paper
+from eposit.refine import Refined, covariance, normal_equations, refine_poses, residuals, whitening
+from eposit.solution import STATUS_TYPE, Solution, Status
+from eposit.starts import centred_points, rim_bearings, starts, turn_back
+
+METHODS = ("best", "centred", "eposit", "posit")
+
+
+@dataclass(frozen=True, slots=True)
+class _Problem:
+    """Validated input: b images of the same n object points."""
+
+    points_in_obj: Array  # (n, 3)
+    points_px: Array  # (b, n, 2), zeros where a row is not usable
+    camera: Camera
+    status: NDArray[np.str_]  # (b,), OK where the row is usable so far
+    weights: Array  # (2, 2, n)
+    absolute: bool  # whether the covariance is absolute: sigma_px was given
+
+    @property
+    def uv(self) -> tuple[Array, Array]:
+        return self.points_px[..., 0].T, self.points_px[..., 1].T
+
+
+def solve(
+    points_in_obj: ArrayLike,
+    points_px: ArrayLike,
+    camera: Camera,
+    method: str = "best",
+    *,
+    refine: bool = True,
+    sigma_px: ArrayLike | None = None,
+    tol: float = 1e-12,
+    max_iterations: int = 2000,
+    theta_centre: tuple[float, float] | None = None,
+) -> Solution:
+    """Pose of an object from n >= 4 points and their image, for one image or a batch.
+
+    points_in_obj: (n, 3), any length unit. points_px: (n, 2) or (b, n, 2), px, pixel centres at integers.
+    method: "best" (centred EPOSIT or a planar start, then Gauss-Newton), "centred", "eposit" (the paper's
+        equations), "posit" (POSIT on pinhole-equivalent points).
+    refine: Gauss-Newton after the start of "best"; the other methods are linear and never refined.
+    sigma_px: standard deviation of the image points: a scalar, (n,), or (n, 2, 2) covariances, px and px^2. It
+        weights the refinement and makes the covariance absolute; None scales the covariance by the residuals.
+    tol: relative change of I and J at which "centred", "eposit" and "posit" stop. max_iterations: their limit.
+    theta_centre: for "eposit" only, the point, px, from which theta is measured; the paper takes the image centre.
+
+    Returns:
+        Solution; a batch gives the same poses as single calls to 1e-12.
+    Raises:
+        ValueError: wrong shapes, fewer than four points, non-finite object points, an unknown method or sigma.
+    Source:
+        Kang et al., EPOSIT. Centring is ours: with exact theta EPOSIT is POSIT on rectified points, and rays may be
+        rectified about M0's ray as well as about the optical axis, which lifts the limit of 54.7 degrees.
+    """
+    if method not in METHODS:
+        raise ValueError(f"unknown method {method!r}; known methods are {', '.join(METHODS)}")
+    if theta_centre is not None and method != "eposit":
+        raise ValueError(f"theta_centre goes with method 'eposit', not {method!r}; leave it out")
+    problem, single = _validate(points_in_obj, points_px, camera, sigma_px)
+    if method == "best":
+        solution = _solve_best(problem, refine)
+    else:
+        solution = _solve_linear(problem, method, tol, max_iterations, theta_centre)
+    return solution.first() if single else solution
+
+
+def _validate(
+    points_in_obj: ArrayLike, points_px: ArrayLike, camera: Camera, sigma_px: ArrayLike | None
+) -> tuple[_Problem, bool]:
+    obj = np.asarray(points_in_obj, dtype=np.float64)
+    pixels = np.asarray(points_px, dtype=np.float64)
+    if obj.ndim != 2 or obj.shape[1] != 3:
+        raise ValueError(f"points_in_obj has shape {obj.shape}; it must be (n, 3)")
+    if len(obj) < 4:
+        raise ValueError(f"points_in_obj has {len(obj)} points; a pose needs at least 4")
+    if not np.all(np.isfinite(obj)):
+        raise ValueError("points_in_obj has NaN or infinite coordinates; give finite ones")
+    if pixels.ndim not in (2, 3) or pixels.shape[-2:] != (len(obj), 2):
+        raise ValueError(f"points_px has shape {pixels.shape}; it must be ({len(obj)}, 2) or (b, {len(obj)}, 2)")
+    single = pixels.ndim == 2
+    pixels = pixels[None] if single else pixels
+    finite = np.all(np.isfinite(pixels), axis=(1, 2))
+    status = np.where(finite, Status.OK, Status.NON_FINITE).astype(STATUS_TYPE)
+    pixels = np.where(finite[:, None, None], pixels, 0.0)
+    weights = whitening(sigma_px, len(obj))
+    return _Problem(obj, pixels, camera, status, weights, sigma_px is not None), single
+
+
+def _solve_linear(
+    problem: _Problem, method: str, tol: float, max_iterations: int, theta_centre: tuple[float, float] | None
+) -> Solution:
+    status = problem.status.copy()
+    bearings = problem.camera.bearing(problem.points_px)
+    _mark(status, np.isnan(bearings).any(axis=(1, 2)), Status.OUTSIDE_LENS)
+    if condition(problem.points_in_obj) > COPLANAR_CONDITION:
+        return _coplanar(problem, status)
+    back = np.broadcast_to(np.eye(3), (len(status), 3, 3))
+    if method == "centred":
+        x, y, back = centred_points(bearings)
+    else:
+        _mark(status, np.any(bearings[..., 2] <= 0.0, axis=1), Status.FIELD_ANGLE)
+        if method == "eposit":
+            x, y = rectify_paper(problem.points_px, problem.camera, theta_centre)
+        else:
+            x, y = rectify_bearings(bearings)
+    start, reproduces = posit_checked(problem.points_in_obj, x, y, tol, max_iterations)
+    _mark(status, ~start.converged, Status.NOT_CONVERGED)
+    _mark(status, ~reproduces, Status.INCONSISTENT)
+    return _finish(problem, turn_back(back, start), status)
+
+
+def _solve_best(problem: _Problem, refined: bool) -> Solution:
+    status = problem.status.copy()
+    bearings = rim_bearings(problem.camera, problem.points_px)
+    _mark(status, np.isnan(bearings).any(axis=(1, 2)), Status.OUTSIDE_LENS)
+    found = starts(problem.points_in_obj, bearings)
+    if not found:
+        return _coplanar(problem, status)
+    best = _lowest([_candidate(problem, start, refined) for start in found])
+    _mark(status, ~(best.converged & np.isfinite(best.cost)), Status.NOT_CONVERGED)
+    return _finish(problem, Start(best.R, best.t, best.steps, best.converged), status)
+
+
+def _candidate(problem: _Problem, start: Start, refined: bool) -> Refined:
+    u, v = problem.uv
+    if refined:
+        result = refine_poses(problem.camera, problem.points_in_obj, u, v, start.R, start.t, problem.weights)
+        return Refined(result.R, result.t, result.cost, result.steps + start.iterations, result.converged)
+    weighted = residuals(problem.camera, problem.points_in_obj, u, v, start.R, start.t, problem.weights)
+    cost = np.nan_to_num(np.sum(weighted**2, axis=(0, 1)), nan=np.inf)
+    return Refined(start.R, start.t, cost, start.iterations, start.converged)
+
+
+def _lowest(candidates: list[Refined]) -> Refined:
+    """For each problem the converged candidate of lowest cost; the earlier one where costs are equal."""
+    choice = np.argmin([np.where(found.converged, found.cost, np.inf) for found in candidates], axis=0)
+    rows = np.arange(len(choice))
+
+    def pick(name: str) -> NDArray[np.generic]:
+        return np.stack([getattr(candidate, name) for candidate in candidates])[choice, rows]
+
+    return Refined(*(pick(name) for name in ("R", "t", "cost", "steps", "converged")))  # pyright: ignore
+
+
+def _rmse(problem: _Problem, R: Array, t: Array) -> Array:
+    u, v = problem.uv
+    plain = whitening(None, len(problem.points_in_obj))
+    with np.errstate(invalid="ignore", over="ignore"):
+        misses = residuals(problem.camera, problem.points_in_obj, u, v, R, t, plain)
+        return np.sqrt(np.mean(np.sum(misses**2, axis=0), axis=0))
+
+
+def _mark(status: NDArray[np.str_], failed: NDArray[np.bool_], reason: Status) -> None:
+    """Give rows that are still OK a reason to fail; the first reason stays."""
+    status[failed & (status == Status.OK)] = reason
+
+
+def _coplanar(problem: _Problem, status: NDArray[np.str_]) -> Solution:
+    _mark(status, np.ones(len(status), bool), Status.COPLANAR)
+    b = len(status)
+    nothing = Start(np.full((b, 3, 3), np.nan), np.full((b, 3), np.nan), np.zeros(b, np.int64), np.zeros(b, bool))
+    return _finish(problem, nothing, status)
+
+
+def _finish(problem: _Problem, found: Start, status: NDArray[np.str_]) -> Solution:
+    ok = status == Status.OK
+    R, t = np.where(ok[:, None, None], found.R, np.nan), np.where(ok[:, None], found.t, np.nan)
+    rmse = np.where(ok, _rmse(problem, R, t), np.nan)
+    spread = np.full((len(ok), 6, 6), np.nan)
+    if np.any(ok):
+        u, v = problem.uv
+        normal, _ = normal_equations(
+            problem.camera, problem.points_in_obj, u[:, ok], v[:, ok], R[ok], t[ok], problem.weights
+        )
+        n = len(problem.points_in_obj)
+        factor = 1.0 if problem.absolute else rmse[ok] ** 2 * n / (2 * n - 6)
+        spread[ok] = covariance(normal) * np.reshape(factor, (-1, 1, 1))
+    return Solution(status, Pose(R, t), found.iterations, rmse, spread)

@@ -1,0 +1,1 @@
+"""Stages, engines, reports and the command line."""

@@ -1,0 +1,203 @@
+"""The command line. A command parses, calls one function and prints; heavy modules are imported inside the commands."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from datasets.errors import UserError
+
+USER_ERROR, INTERRUPTED = 2, 130
+Out = Annotated[Path, typer.Option("--out", help="Folder of the dataset; a run that stopped is resumed there.")]
+Folder = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a dataset.")]
+RecipeName = Annotated[str, typer.Argument(metavar="RECIPE", help="A .toml file, or a name from `recipes`.")]
+Workers = Annotated[int, typer.Option(help="Processes; the result is the same for any number.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars.")]
+
+app = typer.Typer(
+    name="pipelines",
+    help="Rendered images of a chessboard through exact fish-eye cameras, detected, solved and scored against truth.",
+    epilog="Start with: python -m pipelines demo",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+
+@app.command(epilog="Example: python -m pipelines run demo --out out/demo")
+def run(recipe: RecipeName, out: Out, workers: Workers = 1, quiet: Quiet = False) -> None:
+    """Every stage: generate, detect, estimate, score, report."""
+    from pipelines import stages
+
+    console = Console(quiet=quiet)
+    dataset = _claim(recipe, out)
+    stages.run_generate(dataset, workers, console)
+    stages.run_detect(dataset, workers, console)
+    stages.run_estimate(dataset, stages.RUN_SETTINGS, workers, console)
+    stages.run_score(dataset, workers, console)
+    report(out)
+
+
+@app.command(epilog="Example: python -m pipelines generate demo --out out/demo")
+def generate(recipe: RecipeName, out: Out, workers: Workers = 1, quiet: Quiet = False) -> None:
+    """Render images with their truth."""
+    from pipelines import stages
+
+    stages.run_generate(_claim(recipe, out), workers, Console(quiet=quiet))
+
+
+@app.command(epilog="Example: python -m pipelines detect out/demo")
+def detect(folder: Folder, workers: Workers = 1, quiet: Quiet = False) -> None:
+    """Find corners and circle in the images."""
+    from pipelines import stages
+
+    stages.run_detect(_open(folder), workers, Console(quiet=quiet))
+
+
+@app.command(epilog="Example: python -m pipelines estimate out/demo --points truth+noise --noise-px 0.4 --draws 5 --use four")
+def estimate(
+    folder: Folder,
+    solver: Annotated[str, typer.Option(help="best, centred, eposit or posit.")] = "best",
+    points: Annotated[str, typer.Option(help="detected, truth or truth+noise.")] = "detected",
+    camera: Annotated[str, typer.Option(help="Camera the solver assumes: exact, nominal or paper.")] = "exact",
+    use: Annotated[str, typer.Option(help="Object points: four or all.")] = "all",
+    noise_px: Annotated[float, typer.Option(help="Standard deviation of truth+noise, px per axis.")] = 0.4,
+    draws: Annotated[int, typer.Option(help="Draws of truth+noise.")] = 5,
+    workers: Workers = 1,
+    quiet: Quiet = False,
+) -> None:
+    """Estimate poses; nothing is rendered again."""
+    from pipelines import stages
+    from pipelines.estimate import Setting
+
+    setting = Setting(solver, points, camera, use, noise_px, draws)
+    stages.run_estimate(_open(folder), [setting], workers, Console(quiet=quiet))
+
+
+@app.command(epilog="Example: python -m pipelines score out/demo")
+def score(folder: Folder, workers: Workers = 1, quiet: Quiet = False) -> None:
+    """Score every estimate against the truth."""
+    from pipelines import stages
+
+    stages.run_score(_open(folder), workers, Console(quiet=quiet))
+
+
+@app.command(epilog="Example: python -m pipelines report out/demo")
+def report(folder: Folder) -> None:
+    """Write report.html."""
+    from pipelines.report.page import write_report
+
+    typer.echo(f"report: {write_report(_open(folder))}")
+
+
+@app.command(epilog="Example: python -m pipelines demo --out out/demo")
+def demo(out: Out = Path("out/demo"), workers: Workers = 1, quiet: Quiet = False) -> None:
+    """Run the recipe `demo`: 40 images, five lenses, a report."""
+    run("demo", out, workers, quiet)
+
+
+@app.command(epilog="Example: python -m pipelines verify out/demo")
+def verify(folder: Folder) -> None:
+    """Check every shard and master, and print the hash of the content."""
+    from pipelines.verify import verify as check
+
+    digest, problems = check(_open(folder))
+    if problems:
+        more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+        raise UserError(f"{problems[0]}{more}")
+    typer.echo(f"content {digest}")
+
+
+@app.command(epilog="Example: python -m pipelines doctor")
+def doctor() -> None:
+    """Tell what this machine has and what is missing."""
+    from pipelines.doctor import diagnose
+
+    rows = diagnose()
+    table = Table(box=None, show_header=False)
+    for name, fine, found in rows:
+        table.add_row("ok" if fine else "MISSING", name, found)
+    Console().print(table)
+    if not all(fine for _, fine, _ in rows):
+        raise UserError("something that rendering needs is missing; see the lines marked MISSING")
+
+
+@app.command(epilog="Example: python -m pipelines recipes")
+def recipes() -> None:
+    """List the recipes that come with the package."""
+    from datasets.plan import plan
+    from datasets.recipe import load_recipe, recipe_names
+
+    table = Table(box=None)
+    for title in ("name", "frames", "description"):
+        table.add_column(title)
+    for name in recipe_names():
+        recipe, _ = load_recipe(name)
+        table.add_row(name, str(len(plan(recipe))), recipe.description)
+    Console().print(table)
+
+
+@app.command(epilog="Example: python -m pipelines describe demo")
+def describe(recipe: Annotated[str | None, typer.Argument(metavar="[RECIPE]", help="Show its values beside the keys.")] = None) -> None:
+    """Every key of a recipe: default or value, and meaning."""
+    from datasets.recipe import describe as keys
+    from datasets.recipe import load_recipe, values
+
+    given = values(load_recipe(recipe)[0]) if recipe else {}
+    table = Table(box=None)
+    for title in ("key", "value" if recipe else "default", "meaning"):
+        table.add_column(title, overflow="fold")
+    for key, default, meaning in keys():
+        table.add_row(key, given.get(key, default), meaning)
+    Console().print(table)
+
+
+def _claim(recipe: str, out: Path) -> Any:
+    from datasets.plan import plan
+    from datasets.recipe import load_recipe
+    from datasets.store import claim
+
+    loaded, text = load_recipe(recipe)
+    plan(loaded)
+    return claim(out, loaded, text)
+
+
+def _open(folder: Path) -> Any:
+    from datasets.store import open_dataset
+
+    return open_dataset(folder)
+
+
+def guarded(command: Callable[[], Any]) -> int:
+    """Run a command; an expected error becomes one sentence on stderr and exit code 2."""
+    try:
+        command()
+    except SystemExit as stop:
+        return stop.code if isinstance(stop.code, int) else 1
+    except KeyboardInterrupt:
+        print("stopped; run the same command again to go on", file=sys.stderr)
+        return INTERRUPTED
+    except Exception as error:
+        from render.backend import BackendError
+
+        if isinstance(error, UserError | BackendError):
+            print(f"error: {error}", file=sys.stderr)
+            return USER_ERROR
+        if isinstance(error, BrokenPipeError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return 0
+        raise
+    return 0
+
+
+def main() -> int:
+    """Entry point of `python -m pipelines`."""
+    return guarded(app)

@@ -1,0 +1,45 @@
+"""Stage 2: find the target's points in the images. It reads the PNG's bytes and the target's dimensions, nothing else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyarrow as pa
+
+from datasets.errors import UserError
+from datasets.schema import DETECTIONS
+from datasets.store import Dataset
+from pipelines import generate
+from pipelines.detection import detect_points
+from pipelines.rows import table
+from render.develop import decode_png
+
+
+def is_done(dataset: Dataset, index: int) -> bool:
+    """Whether a shard is there."""
+    return dataset.is_done(dataset.shard_path("detections", index, generate.shards(dataset.recipe)))
+
+
+def run_shard(dataset: Dataset, index: int) -> None:
+    """Make one shard of `detections` from the same shard of `frames`."""
+    count = generate.shards(dataset.recipe)
+    path = dataset.shard_path("frames", index, count)
+    frames = dataset.read_shard(path)
+    parts: list[pa.Table] = []
+    for frame_id, image in zip(frames["frame_id"].to_pylist(), frames["image"].to_pylist(), strict=True):
+        try:
+            pixels = decode_png(image["bytes"])
+        except ValueError as error:
+            raise UserError(f"{path}, frame {frame_id}: {error}; delete it and run the generate stage again") from None
+        found = detect_points(pixels, dataset.recipe.target)
+        n = len(found.status)
+        columns = {
+            "frame_id": np.full(n, frame_id),
+            "point_id": np.arange(n),
+            "x_px": found.points_px[:, 0],
+            "y_px": found.points_px[:, 1],
+            "status": found.status,
+            "finder": np.full(n, found.finder),
+            "blur_px": np.full(n, found.blur_px),
+        }
+        parts.append(table(DETECTIONS, columns))
+    dataset.write_shard(dataset.shard_path("detections", index, count), pa.concat_tables(parts))

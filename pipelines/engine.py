@@ -1,0 +1,40 @@
+"""Engines map a stage's function over shards. The function does all the work; an engine only decides where."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from typing import TypeVar
+
+from datasets.errors import UserError
+
+MAX_WORKERS = 256
+Task = TypeVar("Task")
+
+
+def map_shards(run_one: Callable[[Task], None], tasks: Sequence[Task], workers: int) -> Iterator[Task]:
+    """Run every task, here or in `workers` processes, and yield each when it is done, in any order.
+
+    Raises:
+        UserError: a number of workers that is not usable.
+        Exception: what a task raised; tasks not yet begun are cancelled.
+    """
+    if not 1 <= workers <= MAX_WORKERS:
+        raise UserError(f"{workers} workers are not usable; give --workers from 1 to {MAX_WORKERS}")
+    if workers == 1 or len(tasks) < 2:
+        for task in tasks:
+            run_one(task)
+            yield task
+        return
+    # Mitsuba starts threads, which a forked process would not have: processes are spawned.
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(min(workers, len(tasks)), mp_context=context) as pool:
+        futures = {pool.submit(run_one, task): task for task in tasks}
+        try:
+            for future in as_completed(futures):
+                future.result()
+                yield futures[future]
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise

@@ -1,0 +1,152 @@
+"""Stage 1: render, develop and store images with their truth."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+
+from datasets.errors import UserError
+from datasets.plan import Frame, plan, shard_count
+from datasets.recipe import Recipe
+from datasets.schema import FRAMES, KEYPOINTS
+from datasets.store import MASTERS, Dataset, refused
+from eposit.pose import tilt_rad
+from pipelines.rows import pose_columns, table
+from render.develop import develop, encode_png
+from render.master import Master, MasterError, read_master, render_master, write_master
+
+
+def shards(recipe: Recipe) -> int:
+    """Number of shards of this stage."""
+    return shard_count(recipe, plan(recipe))
+
+
+def is_done(dataset: Dataset, index: int) -> bool:
+    """Whether both tables of a shard are there."""
+    count = shards(dataset.recipe)
+    return all(dataset.is_done(dataset.shard_path(name, index, count)) for name in ("frames", "keypoints"))
+
+
+def run_shard(dataset: Dataset, index: int) -> None:
+    """Make one shard of `frames` and `keypoints` and its masters."""
+    recipe = dataset.recipe
+    frames = plan(recipe)
+    count = shard_count(recipe, frames)
+    chosen = frames[index * recipe.shard_frames : (index + 1) * recipe.shard_frames]
+    rows = [_frame_row(dataset, frame) for frame in chosen]
+    truth = pa.concat_tables(_keypoints(recipe, frame) for frame in chosen)
+    dataset.write_shard(dataset.shard_path("keypoints", index, count), truth)
+    dataset.write_shard(dataset.shard_path("frames", index, count), pa.Table.from_pylist(rows, schema=FRAMES))
+
+
+def _frame_row(dataset: Dataset, frame: Frame) -> dict[str, object]:
+    recipe, spec = dataset.recipe, frame.camera
+    camera = spec.true_camera()
+    master, path = _master(dataset, frame)
+    image = develop(master.full(camera), recipe.sensor)
+    coefficients = np.zeros(4)
+    coefficients[: len(spec.coefficients)] = spec.coefficients
+    region = dict(zip(("region_x_px", "region_y_px", "region_width_px", "region_height_px"), master.region, strict=True))
+    pose = {name: values[0] for name, values in pose_columns(frame.cam_from_obj.R[None], frame.cam_from_obj.t[None]).items()}
+    return {
+        "frame_id": frame.frame_id,
+        "pose_id": frame.pose_id,
+        "time_s": frame.time_s,
+        "camera_name": spec.name,
+        "lens": spec.lens,
+        "image": {"bytes": encode_png(image), "path": f"{frame.frame_id:06d}.png"},
+        **pose,
+        **{f"{name}_px": getattr(spec, name) for name in ("fx", "fy", "cx", "cy")},
+        **{f"k{i}": float(k) for i, k in enumerate(coefficients, 1)},
+        "nominal_f_px": spec.nominal_camera().fx,
+        "tilt_deg": float(np.degrees(tilt_rad(frame.cam_from_obj.R))),
+        "width_px": spec.width,
+        "height_px": spec.height,
+        **region,
+        "render_seed": frame.render_seed,
+        "master": path,
+    }
+
+
+def masters(dataset: Dataset) -> Iterator[tuple[Path, str]]:
+    """Path and key of every frame's master."""
+    for frame in plan(dataset.recipe):
+        yield dataset.root / _master_path(frame), _master_key(dataset.recipe, frame)
+
+
+def _master_path(frame: Frame) -> str:
+    return f"{MASTERS}/{frame.frame_id:06d}.exr"
+
+
+def _master(dataset: Dataset, frame: Frame) -> tuple[Master, str]:
+    """The frame's linear light: read if it is there and made from the same things, rendered otherwise."""
+    recipe = dataset.recipe
+    relative = _master_path(frame)
+    path, key = dataset.root / relative, _master_key(recipe, frame)
+    try:
+        return read_master(path, key), relative
+    except MasterError:
+        pass
+    camera = frame.camera.true_camera()
+    try:
+        master = render_master(
+            recipe.target, recipe.light, camera, frame.cam_from_obj, samples=recipe.samples, seed=frame.render_seed
+        )
+        write_master(master, camera, path, key)
+    except OSError as error:
+        raise refused(path, error) from error
+    except ValueError as error:
+        raise UserError(f"frame {frame.frame_id}: {error}") from error
+    return master, relative
+
+
+def _master_key(recipe: Recipe, frame: Frame) -> str:
+    """Hash of all that decides a master; the sensor model is not among it."""
+    parts = {
+        "target": asdict(recipe.target),
+        "light": asdict(recipe.light),
+        "camera": asdict(frame.camera.true_camera()),
+        "R": frame.cam_from_obj.R.tolist(),
+        "t": frame.cam_from_obj.t.tolist(),
+        "samples": recipe.samples,
+        "seed": frame.render_seed,
+    }
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+
+
+def _keypoints(recipe: Recipe, frame: Frame) -> pa.Table:
+    target, camera = recipe.target, frame.camera.true_camera()
+    points = target.points
+    in_cam = frame.cam_from_obj.apply(points)
+    pixels = camera.project(in_cam)
+    outline = pixels.copy()
+    outline[target.circle_index] = outline_centroid(camera.project(frame.cam_from_obj.apply(target.circle_rim())))
+    return table(
+        KEYPOINTS,
+        {
+            "frame_id": np.full(len(points), frame.frame_id),
+            "point_id": np.arange(len(points)),
+            **{f"{axis}_obj_mm": points[:, i] for i, axis in enumerate("xyz")},
+            "x_px": pixels[:, 0],
+            "y_px": pixels[:, 1],
+            "x_outline_px": outline[:, 0],
+            "y_outline_px": outline[:, 1],
+            "theta_deg": np.degrees(np.arctan2(np.hypot(in_cam[:, 0], in_cam[:, 1]), in_cam[:, 2])),
+            "in_image": camera.contains(pixels),
+        },
+    )
+
+
+def outline_centroid(polygon: np.ndarray) -> np.ndarray:
+    """(2,) area centroid of a closed polygon (n, 2)."""
+    origin = polygon[0]  # near the polygon, so that differences of large products do not cost digits
+    p = polygon - origin
+    following = np.roll(p, -1, axis=0)
+    cross = p[:, 0] * following[:, 1] - p[:, 1] * following[:, 0]
+    return origin + cross @ (p + following) / (3.0 * cross.sum())

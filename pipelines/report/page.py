@@ -1,0 +1,86 @@
+"""Stage 5: `report.html`, self-contained: pictures, curves, boxes, tables, and what was run."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import platform
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import numpy as np
+
+from datasets.store import RECIPE_FILE, Dataset, refused
+from pipelines.report import figures
+from pipelines.report.data import ERRORS, detection_rows, score_rows, series
+from pipelines.rows import points_by_frame
+from render.develop import decode_png
+from render.files import replace_atomically
+
+REPORT = "report.html"
+GALLERY = 15  # pictures at most
+VERSIONS = ("mitsuba", "drjit", "numpy", "scipy", "opencv-python-headless", "OpenEXR", "pyarrow")
+
+
+def write_report(dataset: Dataset) -> Path:
+    """Write the report of a dataset that has scores.
+
+    Raises:
+        UserError: a stage is missing or a shard damaged.
+    """
+    columns = ["frame_id", "time_s", "camera_name", "tilt_deg", *(f"region_{a}_px" for a in ("x", "y", "width", "height"))]
+    frames = dataset.read("frames", columns).to_pylist()
+    by_id = {frame["frame_id"]: frame for frame in frames}
+    found = series(dataset.read("scores"))
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent), autoescape=True, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters["number"] = _number
+    html = environment.get_template("page.html").render(
+        recipe=dataset.recipe,
+        recipe_text=(dataset.root / RECIPE_FILE).read_text(encoding="utf-8"),
+        frames=frames,
+        gallery=_gallery(dataset, frames),
+        detection=detection_rows(dataset, frames),
+        series=[
+            {"name": item.name, "helix": figures.along_helix(item, by_id), "boxes": figures.boxes(item, by_id)}
+            for item in found
+        ],
+        errors=ERRORS,
+        scores=score_rows(found, {frame["frame_id"]: frame["camera_name"] for frame in frames}),
+        versions={name: importlib.metadata.version(name) for name in VERSIONS},
+        machine=f"Python {platform.python_version()}, {platform.system()} {platform.machine()}",
+    )
+    path = dataset.root / REPORT
+    try:
+        with replace_atomically(path) as temporary:
+            temporary.write_text(html, encoding="utf-8")
+    except OSError as error:
+        raise refused(path, error) from error
+    return path
+
+
+def _gallery(dataset: Dataset, frames: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Evenly chosen frames with their detected points."""
+    chosen = {frames[int(i)]["frame_id"] for i in np.linspace(0, len(frames) - 1, min(GALLERY, len(frames))).round()}
+    points = points_by_frame(dataset.read("detections"), dataset.recipe.target)
+    pictures: list[dict[str, Any]] = []
+    for path in dataset.shards("frames"):
+        ids = dataset.read_shard(path, ["frame_id"])["frame_id"].to_pylist()
+        if chosen.isdisjoint(ids):
+            continue
+        for frame_id, image in zip(ids, dataset.read_shard(path, ["image"])["image"].to_pylist(), strict=True):
+            if frame_id not in chosen:
+                continue
+            frame = next(frame for frame in frames if frame["frame_id"] == frame_id)
+            region = tuple(frame[f"region_{a}_px"] for a in ("x", "y", "width", "height"))
+            svg = figures.picture(decode_png(image["bytes"]), region, points[frame_id])  # type: ignore[arg-type]
+            found = int(np.isfinite(points[frame_id][:, 0]).sum())
+            pictures.append({**frame, "svg": svg, "found": found, "total": len(points[frame_id])})
+    return pictures
+
+
+def _number(value: float | None) -> str:
+    if value is None or not np.isfinite(value):
+        return "–"
+    return f"{value:.3g}" if abs(value) >= 1e-4 or value == 0.0 else f"{value:.1e}"

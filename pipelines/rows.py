@@ -1,0 +1,58 @@
+"""Columns to tables and back."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from eposit import Camera, Pose
+from render.target import Target
+
+Array = NDArray[np.float64]
+
+
+def table(schema: pa.Schema, columns: dict[str, Any]) -> pa.Table:
+    """A table of `schema` from a mapping of columns."""
+    return pa.table([pa.array(columns[field.name], type=field.type, from_pandas=False) for field in schema], schema=schema)
+
+
+def pose_columns(R: Array, t: Array) -> dict[str, Array]:
+    """Quaternion and position columns of (b, 3, 3) and (b, 3); NaN poses give NaN."""
+    finite = np.all(np.isfinite(R), axis=(1, 2))
+    quaternion = np.full((len(t), 4), np.nan)
+    if np.any(finite):
+        quaternion[finite] = Pose(R[finite], t[finite]).quaternion
+    columns = {f"q_{axis}": quaternion[:, i] for i, axis in enumerate("wxyz")}
+    return columns | {f"t_{axis}_mm": t[:, i] for i, axis in enumerate("xyz")}
+
+
+def poses(rows: pa.Table) -> Pose:
+    """(b,) poses from quaternion and position columns; NaN rows stay NaN."""
+    quaternion = np.stack([rows[f"q_{axis}"].to_numpy() for axis in "wxyz"], axis=1)
+    t = np.stack([rows[f"t_{axis}_mm"].to_numpy() for axis in "xyz"], axis=1)
+    finite = np.all(np.isfinite(quaternion), axis=1)
+    R = np.full((len(t), 3, 3), np.nan)
+    if np.any(finite):
+        R[finite] = Pose.from_quaternion(quaternion[finite], t[finite]).R
+    return Pose(R, t)
+
+
+def camera_of(row: dict[str, Any]) -> Camera:
+    """The true camera of a row of `frames`."""
+    coefficients = tuple(row[f"k{i}"] for i in range(1, 5)) if row["lens"] == "kannala_brandt" else ()
+    return Camera(
+        lens=row["lens"],
+        **{name: row[f"{name}_px"] for name in ("fx", "fy", "cx", "cy", "width", "height")},
+        coefficients=coefficients,
+    )
+
+
+def points_by_frame(rows: pa.Table, target: Target) -> dict[int, Array]:
+    """frame_id to (n, 2) px from a long table of points."""
+    count = len(target.points)
+    frame = rows["frame_id"].to_numpy()
+    pixels = np.stack([rows["x_px"].to_numpy(), rows["y_px"].to_numpy()], axis=1).reshape(-1, count, 2)
+    return {int(frame[i * count]): pixels[i] for i in range(len(pixels))}

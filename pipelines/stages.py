@@ -1,0 +1,96 @@
+"""The stages as steps of a run: which shards are missing, and the progress bar over them."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import closing
+from typing import TypeVar
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
+from rich.text import Text
+
+from datasets.store import Dataset
+from pipelines import detect, estimate, generate, score
+from pipelines.engine import map_shards
+from pipelines.estimate import Setting
+
+Shard = TypeVar("Shard")
+
+# What `run` estimates: our solver on detected and on true points, and the paper's way with four points.
+RUN_SETTINGS = (
+    Setting(),
+    Setting(points="truth"),
+    Setting(use="four"),
+    Setting(solver="eposit", use="four"),
+    Setting(solver="eposit", use="four", camera="nominal"),
+)
+
+
+class _Rate(ProgressColumn):
+    """Steps per second."""
+
+    def render(self, task: Task) -> Text:
+        return Text(f"{task.finished_speed or task.speed or 0.0:.2f}/s")
+
+
+def run_generate(dataset: Dataset, workers: int, console: Console) -> None:
+    """Render what is missing."""
+    indices = range(generate.shards(dataset.recipe))
+    _run("generate", dataset, indices, generate.is_done, generate.run_shard, workers, console)
+
+
+def run_detect(dataset: Dataset, workers: int, console: Console) -> None:
+    """Detect what is missing."""
+    indices = range(generate.shards(dataset.recipe))
+    _run("detect", dataset, indices, detect.is_done, detect.run_shard, workers, console)
+
+
+def run_estimate(dataset: Dataset, settings: Iterable[Setting], workers: int, console: Console) -> None:
+    """Estimate what is missing."""
+    for setting in settings:
+        _run(
+            f"estimate {setting.name}",
+            dataset,
+            range(generate.shards(dataset.recipe)),
+            functools.partial(estimate.is_done, setting=setting),
+            functools.partial(estimate.run_shard, setting=setting),
+            workers,
+            console,
+        )
+
+
+def run_score(dataset: Dataset, workers: int, console: Console) -> None:
+    """Score what is missing.
+
+    Raises:
+        UserError: there are no estimates yet.
+    """
+    dataset.read("estimates", ["frame_id"])
+    _run("score", dataset, score.targets(dataset), score.is_done, score.run_shard, workers, console)
+
+
+def _run(
+    name: str,
+    dataset: Dataset,
+    shards: Sequence[Shard],
+    is_done: Callable[[Dataset, Shard], bool],
+    run_shard: Callable[[Dataset, Shard], None],
+    workers: int,
+    console: Console,
+) -> None:
+    missing = [shard for shard in shards if not is_done(dataset, shard)]
+    if not missing:
+        console.print(f"{name}: all {len(shards)} shards are there")
+        return
+    columns = (
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("shards"), _Rate(),
+        TimeRemainingColumn(),
+    )  # fmt: skip
+    with Progress(*columns, console=console, disable=console.quiet) as progress:
+        bar = progress.add_task(name, total=len(shards), completed=len(shards) - len(missing))
+        with closing(map_shards(functools.partial(run_shard, dataset), missing, workers)) as done:
+            for _ in done:
+                progress.advance(bar)
+    dataset.write_manifest()

@@ -1,0 +1,129 @@
+"""The one door to Mitsuba and Dr.Jit: finds a usable LLVM or GPU, fixes the variant, registers our plugins.
+
+Dr.Jit compiles its kernels with an LLVM library that it loads at run time. Versions below 19 abort the whole process
+at the first `maximum` ("Cannot select: fmaximum"), so the library is found and checked before Dr.Jit is imported.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import ctypes.util
+import functools
+import os
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+MINIMUM_LLVM = 19
+CPU_VARIANT = "llvm_ad_mono"
+CUDA_VARIANT = "cuda_ad_mono"
+VARIANTS = (CPU_VARIANT, CUDA_VARIANT)
+LIBRARY_VARIABLE = "DRJIT_LIBLLVM_PATH"
+ADVICE = f"install one with `pip install karellen-llvm-core`, or set {LIBRARY_VARIABLE} to libLLVM {MINIMUM_LLVM} or later"
+
+
+class BackendError(RuntimeError):
+    """No usable compiler back end; the message is one sentence with the remedy."""
+
+
+def llvm_version(library: Path) -> int | None:
+    """Major version that an LLVM shared library reports, or None if it cannot be loaded as one."""
+    try:
+        handle = ctypes.CDLL(str(library))
+        major = ctypes.c_uint()
+        handle.LLVMGetVersion(ctypes.byref(major), None, None)
+        return int(major.value)
+    except (OSError, AttributeError):
+        return _version_in_name(library)
+
+
+def find_llvm() -> Path:
+    """The LLVM library to use: the one the user names, the PyPI wheel's, then the newest of the system.
+
+    Raises:
+        BackendError: the named one is missing or too old, or none is found.
+    """
+    named = os.environ.get(LIBRARY_VARIABLE)
+    if named:
+        return _checked_choice(Path(named))
+    tried: list[str] = []
+    for library in _candidates():
+        version = _version_in_name(library)
+        if version is not None and version >= MINIMUM_LLVM:
+            return library
+        tried.append(f"{library.name}")
+    found = f"found only {', '.join(tried)}" if tried else "found none"
+    raise BackendError(f"rendering needs LLVM {MINIMUM_LLVM} or later and {found}; {ADVICE}")
+
+
+def cuda_present() -> bool:
+    """Whether a CUDA driver with at least one GPU answers."""
+    name = ctypes.util.find_library("cuda") or "libcuda.so.1"
+    try:
+        driver = ctypes.CDLL(name)
+        count = ctypes.c_int()
+        return driver.cuInit(0) == 0 and driver.cuDeviceGetCount(ctypes.byref(count)) == 0 and count.value > 0
+    except (OSError, AttributeError):
+        return False
+
+
+@functools.cache
+def load() -> Any:
+    """Mitsuba with its variant fixed for this process and our sensor and integrator registered.
+
+    `EPOSIT_VARIANT` chooses between llvm_ad_mono and cuda_ad_mono; without it a CUDA GPU is used where there is one.
+
+    Raises:
+        BackendError: unknown variant, no usable LLVM, or another variant already runs in this process.
+    """
+    variant = os.environ.get("EPOSIT_VARIANT") or (CUDA_VARIANT if cuda_present() else CPU_VARIANT)
+    if variant not in VARIANTS:
+        raise BackendError(f"EPOSIT_VARIANT is {variant!r}; it must be one of {', '.join(VARIANTS)}")
+    if variant == CPU_VARIANT:
+        if "drjit" in sys.modules and LIBRARY_VARIABLE not in os.environ:
+            raise BackendError("drjit was imported before render.backend.load(); call load() first")
+        os.environ[LIBRARY_VARIABLE] = str(find_llvm())
+    elif not cuda_present():
+        raise BackendError(f"EPOSIT_VARIANT is {variant!r} and no CUDA GPU answers; unset it to render on the CPU")
+    import mitsuba as mi
+
+    if mi.variant() not in (None, variant):
+        raise BackendError(f"Mitsuba already runs {mi.variant()!r} here; start a new process for {variant!r}")
+    mi.set_variant(variant)
+    mi.set_log_level(mi.LogLevel.Error)
+    from render.sensor import register_sensor
+    from render.shading import register_integrator
+
+    register_sensor(mi)
+    register_integrator(mi)
+    return mi
+
+
+def _checked_choice(library: Path) -> Path:
+    if not library.is_file():
+        raise BackendError(f"{LIBRARY_VARIABLE} names {str(library)!r}, which is not a file; {ADVICE}")
+    version = llvm_version(library)
+    if version is None:
+        raise BackendError(f"{LIBRARY_VARIABLE} names {str(library)!r}, which is not an LLVM library; {ADVICE}")
+    if version < MINIMUM_LLVM:
+        raise BackendError(
+            f"{LIBRARY_VARIABLE} names LLVM {version}, which would abort the process; {ADVICE}"
+        )
+    return library
+
+
+def _candidates() -> Iterator[Path]:
+    """Libraries of the PyPI wheel, then of the system, newest first."""
+    system = [Path(directory) for directory in ("/usr/lib", "/usr/local/lib", "/opt/homebrew/opt/llvm/lib")]
+    system += sorted(Path("/usr/lib").glob("*-linux-gnu*")) + sorted(Path("/usr/lib").glob("llvm-*/lib"))
+    for directories in ([Path(sys.prefix) / "lib", Path(sys.prefix) / "bin"], system):
+        found = [path for directory in directories for path in directory.glob("libLLVM*") if _version_in_name(path)]
+        found += [path for directory in directories for path in directory.glob("LLVM-C.dll")]
+        yield from sorted(found, key=lambda path: (_version_in_name(path) or 0, str(path)), reverse=True)
+
+
+def _version_in_name(library: Path) -> int | None:
+    match = re.search(r"libLLVM(?:-|\.so\.)(\d+)", library.name)
+    return int(match.group(1)) if match else None

@@ -1,0 +1,133 @@
+"""Light on the target: one square lamp and an even surrounding, fixed to the board, so that every frame is lit alike.
+
+Radiance is relative: 1 is the white board at the board's centre without shadows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from render.target import Array, Target
+
+GRID_MM = 1.0  # spacing of the irradiance map, mm; the narrowest penumbra of the default lamp is 3 mm wide
+LAMP_SAMPLES = 48  # lamp positions along each side for the circle's shadow
+SMOOTH_SAMPLES = 6  # lamp positions along each side where nothing casts a shadow
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Light:
+    """Lamp, surrounding and background.
+
+    Raises:
+        ValueError: a lamp behind the board, a size that is not positive, or a share outside [0, 1].
+    """
+
+    lamp_position_mm: Annotated[tuple[float, float, float], "lamp's centre in the object frame, mm"] = (-400.0, -900.0, -2600.0)
+    lamp_side_mm: Annotated[float, "side of the square lamp, which faces the board's centre, mm"] = 900.0
+    ambient_share: Annotated[float, "share of the even surrounding in the light at the board's centre, 0 to 1"] = 0.3
+    background: Annotated[float, "radiance of what lies behind the board; 1 is the white board at its centre"] = 0.3
+
+    def __post_init__(self) -> None:
+        if not self.lamp_position_mm[2] < 0.0:
+            raise ValueError(
+                f"light lamp_position_mm has z = {self.lamp_position_mm[2]}; the lamp stands in front of the board at z < 0"
+            )
+        if not self.lamp_side_mm > 0.0:
+            raise ValueError(f"light lamp_side_mm is {self.lamp_side_mm}; it must be above 0 mm")
+        if not 0.0 <= self.ambient_share <= 1.0:
+            raise ValueError(f"light ambient_share is {self.ambient_share}; it must lie in 0 to 1")
+        if not 0.0 <= self.background <= 10.0:
+            raise ValueError(f"light background is {self.background}; it must lie in 0 to 10")
+
+    def lamp_corners(self, target: Target) -> Array:
+        """(4, 3) corners of the lamp in the object frame, mm, in order around its border."""
+        centre = np.array(self.lamp_position_mm)
+        toward = target.board_centre - centre
+        toward = toward / np.linalg.norm(toward)
+        side = np.cross(toward, np.array([0.0, 1.0, 0.0]))
+        side = side / np.linalg.norm(side)
+        up = np.cross(side, toward)
+        half = self.lamp_side_mm / 2.0
+        return np.array([centre + half * (a * side + b * up) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
+
+
+def shading_map(target: Target, light: Light) -> tuple[Array, float]:
+    """Radiance over reflectance, and the same on the circle.
+
+    Returns:
+        (rows, columns) map over `target.extent_mm`, samples at texel centres, x along columns; and one number for
+        the circle, which nothing shades. The board's white at its centre, without shadows, has radiance 1.
+    """
+    x0, x1, y0, y1 = target.extent_mm
+    nx, ny = round((x1 - x0) / GRID_MM), round((y1 - y0) / GRID_MM)
+    x, y = x0 + (np.arange(nx) + 0.5) * (x1 - x0) / nx, y0 + (np.arange(ny) + 0.5) * (y1 - y0) / ny
+    points = np.stack((*np.meshgrid(x, y), np.zeros((ny, nx))), axis=-1)
+    lamp = _smooth_lamp(target, light, points)
+    centre = target.circle_centre
+    slopes = (light.lamp_corners(target) - centre)[:, :2] / light.lamp_corners(target)[:, 2:]
+    reach = target.circle_radius_mm + 1.5 * target.circle_height_mm * np.max(np.linalg.norm(slopes, axis=1))
+    distance = np.hypot(points[..., 0] - centre[0], points[..., 1] - centre[1])
+    near = distance < reach + 2.0 * GRID_MM
+    lamp[near] = lamp_irradiance(target, light, points[near], LAMP_SAMPLES, shadowed=True)
+    blocked = blocked_share(distance, target.circle_radius_mm, target.circle_height_mm)
+    ambient = 1.0 - blocked - lamp / np.pi  # neither the circle nor the lamp lets it through
+    lamp_here, ambient_here = reference_irradiance(target, light)
+    disc = lamp_irradiance(target, light, centre[None], LAMP_SAMPLES, shadowed=False)[0]
+    lamp_scale = (1.0 - light.ambient_share) / lamp_here / target.white
+    ambient_scale = light.ambient_share / ambient_here / target.white
+    return lamp_scale * lamp + ambient_scale * ambient, lamp_scale * disc + ambient_scale * (1.0 - disc / np.pi)
+
+
+def reference_irradiance(target: Target, light: Light) -> tuple[float, float]:
+    """Irradiance of a lamp of unit radiance, and the share of the surrounding it leaves, at the board's centre."""
+    lamp = float(lamp_irradiance(target, light, target.board_centre[None], LAMP_SAMPLES, shadowed=False)[0])
+    return lamp, 1.0 - lamp / np.pi
+
+
+def _smooth_lamp(target: Target, light: Light, points: Array) -> Array:
+    """Unshadowed lamp on a coarse grid, interpolated: it varies over metres."""
+    step = 10
+    rows, columns = points.shape[:2]
+    iy, ix = np.arange(0, rows + step, step), np.arange(0, columns + step, step)
+    origin, dx, dy = points[0, 0], points[0, 1] - points[0, 0], points[1, 0] - points[0, 0]
+    coarse = origin + ix[None, :, None] * dx + iy[:, None, None] * dy
+    values = lamp_irradiance(target, light, coarse.reshape(-1, 3), SMOOTH_SAMPLES, shadowed=False).reshape(coarse.shape[:2])
+    across = np.stack([np.interp(np.arange(columns), ix, row) for row in values])
+    return np.stack([np.interp(np.arange(rows), iy, column) for column in across.T], axis=1)
+
+
+def lamp_irradiance(target: Target, light: Light, points: Array, samples: int, *, shadowed: bool) -> Array:
+    """Irradiance of a lamp of unit radiance at (n, 3) points that face -z: midpoint rule over the lamp's area."""
+    corners = light.lamp_corners(target)
+    s = (np.arange(samples) + 0.5) / samples
+    edge_a, edge_b = corners[1] - corners[0], corners[3] - corners[0]
+    normal = np.cross(edge_a, edge_b)
+    area = np.linalg.norm(normal) / samples**2
+    normal = normal / np.linalg.norm(normal)
+    total = np.zeros(len(points))
+    for a in s:
+        for b in s:
+            to_lamp = corners[0] + a * edge_a + b * edge_b - points
+            distance2 = np.sum(to_lamp**2, axis=1)
+            cosines = np.maximum(-to_lamp[:, 2], 0.0) * np.abs(to_lamp @ normal) / distance2
+            value = cosines * area / distance2
+            if shadowed:
+                reach = (target.circle_height_mm + points[:, 2]) / -to_lamp[:, 2]
+                crossing = points[:, :2] + to_lamp[:, :2] * reach[:, None] - target.circle_centre[:2]
+                value = np.where(np.sum(crossing**2, axis=1) < target.circle_radius_mm**2, 0.0, value)
+            total += value
+    return total
+
+
+def blocked_share(distance: Array, radius: float, height: float) -> Array:
+    """Share of an even surrounding's light that a disc blocks at a point below its plane.
+
+    distance: of the point from the disc's axis, any shape. All lengths in one unit.
+    Source:
+        Howell, catalogue of configuration factors, B-13: a differential element to a parallel disc.
+    """
+    a2, r2, h2 = distance**2, radius**2, height**2
+    return 0.5 * (1.0 - (a2 + h2 - r2) / np.sqrt((a2 + h2 + r2) ** 2 - 4.0 * a2 * r2))

@@ -1,0 +1,155 @@
+"""One frame in linear light: rendered in the region that the target can touch, computed everywhere else.
+
+Radiance 1 is the white board at its centre. Outside the region only background and the lens's image circle remain,
+and those need no rays.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eposit import Camera, Pose
+from render import backend
+from render.light import Light
+from render.scene import lookup_scene, reference_scene
+from render.sensor import sensor_dict
+from render.target import Target
+
+Image = NDArray[np.float32]
+Region = tuple[int, int, int, int]  # x, y, width, height, px
+REGION_MARGIN = 8  # px around the target's outline; a point spread of 1.5 px needs 6
+RIM_SAMPLES = 16  # subpixels along each side on the image circle's rim
+
+
+class MasterError(ValueError):
+    """A master that cannot be read; the message names the file and the remedy."""
+
+
+@dataclass(frozen=True, slots=True)
+class Master:
+    """Linear radiance of a region and of the rest."""
+
+    radiance: Image  # (height, width) of the region
+    region: Region
+    background: float  # radiance behind the board
+
+    def full(self, camera: Camera) -> Image:
+        """(camera.height, camera.width) radiance of the whole picture."""
+        picture = (self.background * lens_coverage(camera)).astype(np.float32)
+        x, y, width, height = self.region
+        picture[y : y + height, x : x + width] = self.radiance
+        return picture
+
+
+def target_region(target: Target, camera: Camera, cam_from_obj: Pose, margin: int = REGION_MARGIN) -> Region:
+    """The smallest rectangle of the picture that holds the target's image and a margin.
+
+    Raises:
+        ValueError: the target has no image, or none inside the picture.
+    """
+    outline = camera.project(cam_from_obj.apply(target.outline()))
+    if np.any(np.isnan(outline)):
+        return 0, 0, camera.width, camera.height  # part of the board is beyond the lens: it may reach anywhere
+    low = np.floor(outline.min(axis=0)).astype(int) - margin
+    high = np.ceil(outline.max(axis=0)).astype(int) + margin + 1
+    low, high = np.maximum(low, 0), np.minimum(high, (camera.width, camera.height))
+    if np.any(high <= low):
+        raise ValueError("the target's image lies outside the picture; move the target or the camera")
+    return int(low[0]), int(low[1]), int(high[0] - low[0]), int(high[1] - low[1])
+
+
+def render_master(
+    target: Target,
+    light: Light,
+    camera: Camera,
+    cam_from_obj: Pose,
+    *,
+    samples: int,
+    seed: int,
+    region: Region | None = None,
+    reference: bool = False,
+) -> Master:
+    """Render one frame in linear light, float32, box filter.
+
+    samples: rays per pixel, a square number (multijittered). seed: 32 bits; the same seed gives the same bits.
+    region: pixels to render, by default the target's. reference: Mitsuba's direct light instead of the looked-up one.
+    """
+    mi = backend.load()
+    region = target_region(target, camera, cam_from_obj) if region is None else region
+    scene = (reference_scene if reference else lookup_scene)(target, light)
+    sensor = mi.load_dict(sensor_dict(camera, cam_from_obj, region, samples))
+    film = np.array(mi.render(scene, sensor=sensor, spp=samples, seed=seed & 0xFFFFFFFF))
+    x, y, width, height = region
+    behind = lens_coverage(camera)[y : y + height, x : x + width] - film[..., 1]
+    radiance = film[..., 0] + np.float32(light.background) * np.maximum(behind, 0.0)
+    return Master(radiance.astype(np.float32), region, light.background)
+
+
+@functools.lru_cache(maxsize=8)
+def lens_coverage(camera: Camera) -> Image:
+    """(height, width) share of each pixel that the lens sees: 1 inside the image circle, 0 outside."""
+    rim = camera.law.rho_max
+    corner = np.hypot((camera.width + abs(camera.cx)) / camera.fx, (camera.height + abs(camera.cy)) / camera.fy)
+    if not np.isfinite(rim) or rim >= corner:
+        return np.ones((camera.height, camera.width), np.float32)
+    x, y = (np.arange(camera.width) - camera.cx) / camera.fx, (np.arange(camera.height) - camera.cy) / camera.fy
+    radius = np.hypot(x[None], y[:, None])
+    coverage = (radius <= rim).astype(np.float32)
+    pixel = 1.0 / min(camera.fx, camera.fy)
+    rows, columns = np.nonzero(np.abs(radius - rim) <= pixel)
+    sub = (np.arange(RIM_SAMPLES) + 0.5) / RIM_SAMPLES - 0.5
+    fine_x = x[columns, None, None] + sub[None, None, :] / camera.fx
+    fine_y = y[rows, None, None] + sub[None, :, None] / camera.fy
+    coverage[rows, columns] = np.mean(np.hypot(fine_x, fine_y) <= rim, axis=(1, 2))
+    return coverage
+
+
+def write_master(master: Master, camera: Camera, path: Path, key: str = "") -> None:
+    """EXR with the region as data window inside the picture as display window; atomic, lossless.
+
+    key: what the master was made from, for `read_master` to compare.
+    """
+    import OpenEXR
+
+    from render.files import replace_atomically
+
+    x, y, width, height = master.region
+    header = {
+        "compression": OpenEXR.ZIP_COMPRESSION,
+        "type": OpenEXR.scanlineimage,
+        "dataWindow": (np.array([x, y], np.int32), np.array([x + width - 1, y + height - 1], np.int32)),
+        "displayWindow": (np.array([0, 0], np.int32), np.array([camera.width - 1, camera.height - 1], np.int32)),
+        "background": float(master.background),
+        "key": key,
+    }
+    with replace_atomically(path) as temporary, OpenEXR.File(header, {"Y": master.radiance}) as file:
+        file.write(str(temporary))
+
+
+def read_master(path: Path, key: str = "") -> Master:
+    """The master in an EXR file.
+
+    Raises:
+        MasterError: the file is missing, truncated, not one of ours, or made from something else than `key`.
+    """
+    import OpenEXR
+
+    if not path.is_file():
+        raise MasterError(f"{path} is missing; run the generate stage again to render it")
+    try:
+        with OpenEXR.File(str(path)) as file:
+            header, channels = file.header(), file.channels()
+            if header["key"] != key:
+                raise MasterError(f"{path} belongs to another frame or recipe; delete it and run the generate stage again")
+            (low, high), radiance = header["dataWindow"], channels["Y"].pixels
+            region = (int(low[0]), int(low[1]), int(high[0] - low[0] + 1), int(high[1] - low[1] + 1))
+            return Master(np.array(radiance, np.float32), region, float(header["background"]))
+    except MasterError:
+        raise
+    except (ValueError, RuntimeError, KeyError, OSError) as error:
+        raise MasterError(f"{path} cannot be read as a master; delete it and run the generate stage again") from error
