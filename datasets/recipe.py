@@ -100,7 +100,9 @@ class Recipe(BaseModel):
             raise ValueError(f"cameras are named {', '.join(names)}; give each its own name")
         indices = self.four_indices()
         if len(indices) != 4 or len(set(indices)) != 4:
-            raise ValueError(f"four has {len(indices)} points, {len(set(indices))} of them different; give four different ones")
+            raise ValueError(
+                f"four has {len(indices)} points, {len(set(indices))} of them different; give four different ones"
+            )
         return self
 
     def four_indices(self) -> list[int]:
@@ -128,7 +130,9 @@ def parse_recipe(text: str, source: str) -> Recipe:
     except (TypeError, ValueError) as error:
         if isinstance(error, ValidationError):
             raise UserError(f"{source}: {_sentence(error)}") from None
-        raise UserError(f"{source} holds a value that a recipe cannot take: {error}; use numbers, texts and lists") from None
+        raise UserError(
+            f"{source} holds a value that a recipe cannot take: {error}; use numbers, texts and lists"
+        ) from None
 
 
 def load_recipe(name: str) -> tuple[Recipe, str]:
@@ -182,7 +186,9 @@ def values(recipe: Recipe) -> dict[str, str]:
         head, _, tail = key.partition(".")
         value = getattr(recipe, head)
         if head == "cameras":
-            found[key] = ", ".join(_toml(getattr(camera, tail)) for camera in value) if tail else f"{len(value)} cameras"
+            found[key] = (
+                ", ".join(_toml(getattr(camera, tail)) for camera in value) if tail else f"{len(value)} cameras"
+            )
         else:
             found[key] = _toml(getattr(value, tail)) if tail else "section" if is_dataclass(value) else _toml(value)
     return found
@@ -208,7 +214,9 @@ def _sentence(error: ValidationError) -> str:
     """The first fault of a validation as one sentence with the key's path."""
     # A union reports every branch; the branch that came furthest says most.
     first = error.errors(include_url=False)[0]
-    path = [str(part) for part in first["loc"] if not (isinstance(part, str) and part.startswith(("tuple[", "literal[")))]
+    path = [
+        str(part) for part in first["loc"] if not (isinstance(part, str) and part.startswith(("tuple[", "literal[")))
+    ]
     key = ".".join(path) or "recipe"
     kind, given = first["type"], first.get("input")
     if kind in ("extra_forbidden", "unexpected_keyword_argument"):
@@ -219,8 +227,10 @@ def _sentence(error: ValidationError) -> str:
     if kind in ("missing", "missing_argument", "missing_keyword_only_argument"):
         return f"key {key!r} is missing; add it"
     if kind == "value_error":
-        return str(first["ctx"]["error"])
-    return f"key {key!r} is {_short(given)}: {first['msg'][:1].lower()}{first['msg'][1:]}; see `describe` for its meaning"
+        return str(first.get("ctx", {}).get("error", first["msg"]))
+    return (
+        f"key {key!r} is {_short(given)}: {first['msg'][:1].lower()}{first['msg'][1:]}; see `describe` for its meaning"
+    )
 
 
 def _keys_beside(path: list[str]) -> list[str]:

@@ -1,4 +1,4 @@
-"""Arrow schemas of the tables. Units are in the names, meanings in the fields' metadata; the dictionary is made from them."""
+"""Arrow schemas of the tables. Units are in the names, meanings in the metadata; the dictionary is made from them."""
 
 from __future__ import annotations
 

@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from eposit import Pose
+from eposit.arrays import Array
 from eposit.pose import rotation_from_euler
 from render.target import Target
 
-Array = NDArray[np.float64]
 NAMED_POINTS = ("board_centre", "origin")
 
 

@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from eposit.lens import Array, Lens, get_lens
+from eposit.arrays import Array, Mask
+from eposit.lens import Lens, get_lens
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,7 +69,7 @@ class Camera:
         scale = np.where(on_axis, 0.0, radius / np.where(on_axis, 1.0, side)) + 0.0 * radius
         return np.stack((self.fx * x * scale + self.cx, self.fy * y * scale + self.cy), axis=-1)
 
-    def sees(self, points_in_cam: ArrayLike) -> NDArray[np.bool_]:
+    def sees(self, points_in_cam: ArrayLike) -> Mask:
         """(..., 3) points to a (...) mask: the lens gives the point an image (inside the picture or not)."""
         points = _last_axis(points_in_cam, 3, "points_in_cam")
         x, y, z = np.moveaxis(points, -1, 0)
@@ -85,7 +86,7 @@ class Camera:
         scale = np.where(on_axis, 1.0, np.sin(theta) / np.where(on_axis, 1.0, radius))
         return np.stack((x * scale, y * scale, np.cos(theta)), axis=-1)
 
-    def contains(self, points_px: ArrayLike) -> NDArray[np.bool_]:
+    def contains(self, points_px: ArrayLike) -> Mask:
         """(..., 2) px to a (...) mask: the point lies on the picture's area. NaN does not."""
         pixels = _last_axis(points_px, 2, "points_px")
         u, v = pixels[..., 0], pixels[..., 1]

@@ -12,9 +12,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from eposit.arrays import Array, Mask
+
 Law = Callable[[Array], Array]
 
 
@@ -31,7 +32,7 @@ class Lens:
     includes_max: bool  # whether theta_max itself has an image
     rho_max: float  # normalised radius at theta_max, possibly infinite
 
-    def sees(self, theta: ArrayLike) -> NDArray[np.bool_]:
+    def sees(self, theta: ArrayLike) -> Mask:
         """Mask of incidence angles (rad, any shape) that have an image. NaN is not seen."""
         angle = np.asarray(theta, dtype=np.float64)
         below = angle <= self.theta_max if self.includes_max else angle < self.theta_max

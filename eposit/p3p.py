@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from eposit.lens import Array
+from eposit.arrays import Array
 
 
 def p3p_starts(points_in_obj: Array, bearings: Array, keep: int) -> list[tuple[Array, Array]]:
@@ -34,7 +34,9 @@ def _widest_triangle(points_in_obj: Array) -> list[int]:
     """Three points of large area: the two farthest apart, then the one farthest from their line."""
     gaps = np.linalg.norm(points_in_obj[:, None] - points_in_obj[None], axis=-1)
     first, second = np.unravel_index(np.argmax(gaps), gaps.shape)
-    areas = np.linalg.norm(np.cross(points_in_obj - points_in_obj[first], points_in_obj[second] - points_in_obj[first]), axis=1)
+    areas = np.linalg.norm(
+        np.cross(points_in_obj - points_in_obj[first], points_in_obj[second] - points_in_obj[first]), axis=1
+    )
     return [int(first), int(second), int(np.argmax(areas))]
 
 
@@ -66,7 +68,7 @@ def _depths(triangle: Array, bearings: Array) -> Array:
 
 
 def _quartic_roots(rising: list[Array]) -> Array:
-    """(b, 4) real parts of the roots: noise turns a double root into a complex pair, whose real part is a good start."""
+    """(b, 4) real parts of the roots: noise turns a double root into a complex pair; its real part is a good start."""
     lead = np.where(np.abs(rising[4]) > 1e-14 * np.max(np.abs(rising), axis=0), rising[4], np.nan)
     companion = np.zeros((len(lead), 4, 4))
     companion[:, [1, 2, 3], [0, 1, 2]] = 1.0
@@ -98,6 +100,7 @@ def _frame(corners: Array) -> Array:
     with np.errstate(invalid="ignore", divide="ignore"):
         along = corners[..., 1, :] - corners[..., 0, :]
         along = along / np.linalg.norm(along, axis=-1, keepdims=True)
-        normal = np.cross(along, corners[..., 2, :] - corners[..., 0, :])
+        normal: Array = np.cross(along, corners[..., 2, :] - corners[..., 0, :])
         normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
-    return np.stack((along, np.cross(normal, along), normal), axis=-1)
+    across: Array = np.cross(normal, along)
+    return np.stack((along, across, normal), axis=-1)

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from eposit.lens import Array
+from eposit.arrays import Array
 
 
 def plane_axes(points_in_obj: Array) -> tuple[Array, Array, Array]:
-    """Centroid (3,), axes (3, 3) as rows with the direction of least spread last, and the spreads (3,) of (n, 3) points."""
+    """Centroid (3,), axes (3, 3) as rows, that of least spread last, and spreads (3,) of (n, 3) points."""
     centroid = points_in_obj.mean(axis=0)
     _, spreads, axes = np.linalg.svd(points_in_obj - centroid, full_matrices=True)
     return centroid, axes, np.pad(spreads, (0, 3 - len(spreads)))
@@ -31,10 +31,10 @@ def homography_start(points_in_obj: Array, bearings: Array) -> tuple[Array, Arra
     plane = np.column_stack((flat, np.ones(len(flat))))
     rows = np.concatenate([_cross_rows(bearings, axis, plane) for axis in range(3)], axis=1)
     _, _, right = np.linalg.svd(rows, full_matrices=True)
-    H = right[:, -1].reshape(-1, 3, 3)
-    facing = np.sign(np.sum((plane @ np.swapaxes(H, 1, 2)) * bearings, axis=(1, 2)))
-    H = H * np.where(facing == 0.0, 1.0, facing)[:, None, None]
-    first, second, position = np.moveaxis(H, -1, 0)
+    free = right[:, -1].reshape(-1, 3, 3)
+    facing = np.sign(np.sum((plane @ np.swapaxes(free, 1, 2)) * bearings, axis=(1, 2)))
+    homography = free * np.where(facing == 0.0, 1.0, facing)[:, None, None]
+    first, second, position = np.moveaxis(homography, -1, 0)
     scale = 0.5 * (np.linalg.norm(first, axis=1) + np.linalg.norm(second, axis=1))[:, None]
     nearest = _nearest_rotation(np.stack((first, second, np.cross(first, second) / scale), axis=-1) / scale[..., None])
     axes = axes if np.linalg.det(axes) > 0.0 else axes * np.array([[1.0], [1.0], [-1.0]])

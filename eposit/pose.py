@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from eposit.lens import Array
+from eposit.arrays import Array
 
 
 @dataclass(frozen=True, slots=True)

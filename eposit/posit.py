@@ -12,15 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from eposit.arrays import Array, Mask
 from eposit.camera import Camera
-from eposit.lens import Array
 from eposit.p3p import p3p_starts
 
 CONVERGENT_TAN = np.sqrt(2.0)  # tan of the incidence angle beyond which the iteration no longer contracts
 DOUBTFUL_MISFIT = 1e-3  # misfit over spread above which a fixed point is compared with the poses of a triangle
 CONSISTENT_MISFIT = 0.1  # misfit over spread above which a fixed point is no pose
-WORSE_FACTOR = 10.0  # EPOSIT's misfit is 1.3 to 2.2 times the least one; ten times that of another pose is wrong
-MISFIT_FLOOR = 1e-6  # misfit over spread that counts as exact
+EXACT_MISFIT = 1e-7  # misfit over spread of a triangle's pose that shows noise-free points, which EPOSIT then must fit
 COPLANAR_CONDITION = 1e4  # cond(A) from which the points count as coplanar: there double precision leaves 12 digits
 
 
@@ -31,7 +30,7 @@ class Start:
     R: Array  # (b, 3, 3)
     t: Array  # (b, 3), unit of the object points
     iterations: NDArray[np.int64]  # (b,)
-    converged: NDArray[np.bool_]  # (b,)
+    converged: Mask  # (b,)
 
     def put(self, rows: NDArray[np.int64], other: Start) -> None:
         """Overwrite some rows with those of another result; iterations add up."""
@@ -101,7 +100,7 @@ def posit(
         Paper, equations 21 to 25; DeMenthon and Davis 1995.
     """
     offsets = points_in_obj[1:] - points_in_obj[0]
-    solver = np.linalg.pinv(offsets)
+    solver: Array = np.linalg.pinv(offsets)
     b = x.shape[1]
     stacked = np.full((6, b), np.nan)  # I above J
     iterations = np.zeros(b, dtype=np.int64)
@@ -133,37 +132,38 @@ def posit(
     return Start(R, t, iterations, converged)
 
 
-def posit_checked(
-    points_in_obj: Array, x: Array, y: Array, tol: float, max_iterations: int
-) -> tuple[Start, NDArray[np.bool_]]:
+def posit_checked(points_in_obj: Array, x: Array, y: Array, tol: float, max_iterations: int) -> tuple[Start, Mask]:
     """`posit`, retried inside its limit, and a (b,) mask of the poses that reproduce their points.
 
     The fixed point that the iteration finds need not be the pose (about one random object in a thousand), and a pose
-    need not attract it. The poses of a triangle of the points tell: where one of them fits far better, the same
-    equations are iterated again from there with half steps, provided that all points lie below atan(sqrt 2).
+    need not attract it. A misfit of a tenth of the points' spread tells, and for noise-free points the poses of a
+    triangle do: one of them fits exactly. From it the same equations are iterated again with half steps, provided
+    that all points lie below atan(sqrt 2). Under noise a flat object's misfit is large and no reason to reject.
     """
     start = posit(points_in_obj, x, y, tol, max_iterations)
     misfit, spread = _misfit(points_in_obj, x, y, start.R, start.t)
-    best = np.zeros_like(misfit)
+    limit = CONSISTENT_MISFIT * spread
     doubtful = np.flatnonzero(~(misfit <= DOUBTFUL_MISFIT * spread) & np.all(np.isfinite(x) & np.isfinite(y), axis=0))
-    if len(doubtful):
-        xd, yd = x[:, doubtful], y[:, doubtful]
-        rays = np.stack((xd.T, yd.T, np.ones_like(xd.T)), axis=-1)
-        ((R, t),) = p3p_starts(points_in_obj, rays / np.linalg.norm(rays, axis=-1, keepdims=True), 1)
-        best[doubtful] = np.nan_to_num(_misfit(points_in_obj, xd, yd, R, t)[0], nan=np.inf)
-        worse = ~(misfit[doubtful] <= WORSE_FACTOR * best[doubtful] + MISFIT_FLOOR * spread[doubtful])
-        again = worse & np.all(np.hypot(xd, yd) < CONVERGENT_TAN, axis=0) & (t[:, 2] > 0.0)
-        if np.any(again):
-            offsets = points_in_obj[1:] - points_in_obj[0]
-            epsilon = (R[again, 2] @ offsets.T).T / (t[again] + R[again] @ points_in_obj[0])[:, 2]
-            start.put(doubtful[again], posit(points_in_obj, xd[:, again], yd[:, again], tol, max_iterations, epsilon, 0.5))
-            misfit, _ = _misfit(points_in_obj, x, y, start.R, start.t)
-    limit = np.minimum(CONSISTENT_MISFIT * spread, WORSE_FACTOR * best + DOUBTFUL_MISFIT * spread)
+    if not len(doubtful):
+        return start, misfit <= limit
+    xd, yd = x[:, doubtful], y[:, doubtful]
+    rays = np.stack((xd.T, yd.T, np.ones_like(xd.T)), axis=-1)
+    ((R, t),) = p3p_starts(points_in_obj, rays / np.linalg.norm(rays, axis=-1, keepdims=True), 1)
+    exact = _misfit(points_in_obj, xd, yd, R, t)[0] <= EXACT_MISFIT * spread[doubtful]
+    limit[doubtful[exact]] = DOUBTFUL_MISFIT * spread[doubtful[exact]]
+    inside = np.all(np.hypot(xd, yd) < CONVERGENT_TAN, axis=0) & (t[:, 2] > 0.0)
+    again = ~(misfit[doubtful] <= limit[doubtful]) & inside
+    if np.any(again):
+        offsets = points_in_obj[1:] - points_in_obj[0]
+        epsilon = (R[again, 2] @ offsets.T).T / (t[again] + R[again] @ points_in_obj[0])[:, 2]
+        retried = posit(points_in_obj, xd[:, again], yd[:, again], tol, max_iterations, epsilon, 0.5)
+        start.put(doubtful[again], retried)
+        misfit, _ = _misfit(points_in_obj, x, y, start.R, start.t)
     return start, misfit <= limit
 
 
 def _misfit(points_in_obj: Array, x: Array, y: Array, R: Array, t: Array) -> tuple[Array, Array]:
-    """RMS distance of reprojections from the pinhole points, and the RMS spread of those, each (b,); NaN for no pose."""
+    """RMS distance of reprojections from the pinhole points, and the RMS spread of those, each (b,)."""
     with np.errstate(all="ignore"):
         px, py, pz = np.moveaxis(points_in_obj @ np.swapaxes(R, 1, 2) + t[:, None], -1, 0)
         misses = (px / pz).T - x, (py / pz).T - y

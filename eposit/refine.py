@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from eposit.arrays import Array, Mask
 from eposit.camera import Camera
-from eposit.lens import Array
 from eposit.pose import rotation_from_vector
 
 STEP_TOL = 1e-11  # rad and relative translation; the floor of double precision is about 1e-13
@@ -28,7 +28,7 @@ class Refined:
     t: Array  # (b, 3)
     cost: Array  # (b,) sum of squared residuals: px^2, or without unit where they were divided by sigma
     steps: NDArray[np.int64]  # (b,)
-    converged: NDArray[np.bool_]  # (b,)
+    converged: Mask  # (b,)
 
 
 def whitening(sigma_px: Array | None, n: int) -> Array:
@@ -61,7 +61,9 @@ def residuals(camera: Camera, points_in_obj: Array, u: Array, v: Array, R: Array
     return _weigh(weights, np.stack(_project(camera, x, y, z)) - np.stack((u, v)))
 
 
-def refine_poses(camera: Camera, points_in_obj: Array, u: Array, v: Array, R: Array, t: Array, weights: Array) -> Refined:
+def refine_poses(
+    camera: Camera, points_in_obj: Array, u: Array, v: Array, R: Array, t: Array, weights: Array
+) -> Refined:
     """Levenberg-Marquardt from the given poses.
 
     points_in_obj: (n, 3). u, v: (n, b) px. R, t: (b, 3, 3), (b, 3); NaN rows stay NaN. weights: (2, 2, n).

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from eposit.lens import Array
+from eposit.arrays import Array
 from eposit.pose import Pose
 
 
@@ -42,4 +42,3 @@ class Solution:
         pose = Pose(self.cam_from_obj.R[0], self.cam_from_obj.t[0])
         status, rmse = Status(str(self.status[0])), float(self.reprojection_rmse_px[0])
         return Solution(status, pose, int(self.iterations[0]), rmse, self.covariance[0])
-

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from eposit.arrays import Array, Mask
 from eposit.camera import Camera
-from eposit.lens import Array
 from eposit.pose import Pose
 from eposit.posit import COPLANAR_CONDITION, Start, condition, posit_checked, rectify_bearings, rectify_paper
 from eposit.refine import Refined, covariance, normal_equations, refine_poses, residuals, whitening
@@ -95,7 +95,7 @@ def _validate(
     finite = np.all(np.isfinite(pixels), axis=(1, 2))
     status = np.where(finite, Status.OK, Status.NON_FINITE).astype(STATUS_TYPE)
     pixels = np.where(finite[:, None, None], pixels, 0.0)
-    weights = whitening(sigma_px, len(obj))
+    weights = whitening(None if sigma_px is None else np.asarray(sigma_px, dtype=np.float64), len(obj))
     return _Problem(obj, pixels, camera, status, weights, sigma_px is not None), single
 
 
@@ -104,7 +104,7 @@ def _solve_linear(
 ) -> Solution:
     status = problem.status.copy()
     bearings = problem.camera.bearing(problem.points_px)
-    _mark(status, np.isnan(bearings).any(axis=(1, 2)), Status.OUTSIDE_LENS)
+    _mark(status, _any_row(np.isnan(bearings)), Status.OUTSIDE_LENS)
     if condition(problem.points_in_obj) > COPLANAR_CONDITION:
         return _coplanar(problem, status)
     back = np.broadcast_to(np.eye(3), (len(status), 3, 3))
@@ -125,7 +125,7 @@ def _solve_linear(
 def _solve_best(problem: _Problem, refined: bool) -> Solution:
     status = problem.status.copy()
     bearings = rim_bearings(problem.camera, problem.points_px)
-    _mark(status, np.isnan(bearings).any(axis=(1, 2)), Status.OUTSIDE_LENS)
+    _mark(status, _any_row(np.isnan(bearings)), Status.OUTSIDE_LENS)
     found = starts(problem.points_in_obj, bearings)
     if not found:
         return _coplanar(problem, status)
@@ -163,7 +163,11 @@ def _rmse(problem: _Problem, R: Array, t: Array) -> Array:
         return np.sqrt(np.mean(np.sum(misses**2, axis=0), axis=0))
 
 
-def _mark(status: NDArray[np.str_], failed: NDArray[np.bool_], reason: Status) -> None:
+def _any_row(values: Mask) -> Mask:
+    return np.asarray(np.any(values.reshape(len(values), -1), axis=1))
+
+
+def _mark(status: NDArray[np.str_], failed: Mask, reason: Status) -> None:
     """Give rows that are still OK a reason to fail; the first reason stays."""
     status[failed & (status == Status.OK)] = reason
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from eposit.arrays import Array
 from eposit.camera import Camera
-from eposit.lens import Array
 from eposit.p3p import p3p_starts
 from eposit.planar import homography_start, mirror_twin, plane_axes
 from eposit.posit import COPLANAR_CONDITION, Start, centring_rotations, condition, posit, rectify_bearings

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.surface import Array
+from eposit.arrays import Array
 from render.target import Target
 
 Grey = NDArray[np.uint8]
@@ -44,7 +44,7 @@ def find_board(image: Grey, target: Target) -> Found | None:
 
 def _classic(image: Grey, inner: tuple[int, int]) -> Array | None:
     found, corners = cv2.findChessboardCorners(image, inner, flags=CLASSIC_FLAGS | cv2.CALIB_CB_FAST_CHECK)
-    return corners if found else None
+    return np.asarray(corners, np.float64) if found else None
 
 
 def _enlarged(image: Grey, inner: tuple[int, int]) -> Array | None:

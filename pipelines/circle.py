@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erf
 
-from pipelines.surface import Array, BoardMap
+from eposit.arrays import Array, Mask
+from pipelines.surface import BoardMap
 from render.light import blocked_share
 from render.target import Target
 
@@ -30,7 +31,7 @@ BAND_PX = 3.0  # pixels take part up to this distance outside the edge
 SQUARE_MARGIN_PX = 2.2  # and if they are this far from black squares
 INTERIOR = 0.5  # share of the ellipse whose pixels take part on all sides
 LEAST_PIXELS = 24
-LINES_PER_PX = 8  # integration lines of the blurred ellipse
+LINES_PER_PX = 3  # integration lines of the blurred ellipse
 TOLERANCES = (0.2, 0.1, 0.05, 0.025, 0.015, 0.015)  # scale of the robust weights, as a share of black to white
 STEPS_EACH = 2
 START_BLUR_PX = 0.8
@@ -54,26 +55,41 @@ class _Ellipse:
     away: Array  # (2,) unit direction in which the height displaces the circle, zero if it hardly does
 
 
+def locate_circle(image: NDArray[np.uint8], board: BoardMap, target: Target) -> Array:
+    """(2,) the circle's centre to about half a pixel: the strongest dark contour near where the board puts it."""
+    found = _locate(image, board, target)
+    return board(target.circle_centre[:2] / target.square_mm)[0] if found is None else found[1]
+
+
 def find_circle(image: NDArray[np.uint8], board: BoardMap, target: Target) -> Circle | None:
     """The circle's centre, or None if no ellipse of the right shape is near where the board puts it."""
+    found = _locate(image, board, target)
+    if found is None:
+        return None
+    patch, centre, away = found
+    at, radius = target.circle_centre[:2] / target.square_mm, target.circle_radius_mm / target.square_mm
+
+    def ellipse_at(point: Array) -> _Ellipse:
+        # A homothety about the camera's centre carries the raised circle onto the board: its image is that of a
+        # circle on the board at the place behind it, hardly larger.
+        return _ellipse(_rim(board, board.invert(point, at), radius), away)
+
+    return _fit(patch, ellipse_at, centre)
+
+
+def _locate(image: NDArray[np.uint8], board: BoardMap, target: Target) -> tuple[_Patch, Array, Array] | None:
+    """Pixels around the circle, its rough centre, its displacement by its height; None at the image's border."""
     at = target.circle_centre[:2] / target.square_mm
-    jacobian = board.jacobian(at)
+    foot, jacobian = board(at)[0], board.jacobian(at)
     parallax = board.parallax(at, target.circle_height_mm / target.square_mm)
     rim = _rim(board, at, target.circle_radius_mm / target.square_mm)
     reach = SEARCH_SHARE * np.sqrt(abs(np.linalg.det(jacobian)))
     patch = _Patch.around(image, board, target, float(np.abs(rim).max() + np.abs(parallax).max() + reach + BAND_PX + 2))
     if patch is None:
         return None
-    candidates = [_search(patch, rim, board(at)[0], sign * parallax, reach) for sign in (1.0, -1.0)]
+    candidates = [_search(patch, rim, foot, sign * parallax, reach) for sign in (1.0, -1.0)]
     centre, _, away = max(candidates, key=lambda candidate: candidate[1])
-
-    def ellipse_at(point: Array) -> _Ellipse:
-        # A homothety about the camera's centre carries the raised circle onto the board: its image is that of a
-        # circle on the board at the place behind it, hardly larger.
-        behind = board.invert(point, at)
-        return _ellipse(_rim(board, behind, target.circle_radius_mm / target.square_mm), away)
-
-    return _fit(patch, ellipse_at, centre)
+    return patch, centre, away
 
 
 def _rim(board: BoardMap, at: Array, radius: float) -> Array:
@@ -103,8 +119,9 @@ class _Patch:
     grey: Array  # (h, w)
     x: Array  # (w,) px
     y: Array  # (h,) px
-    white: NDArray[np.bool_]  # (h, w) pixels that see a white square or the margin, away from black squares
+    white: Mask  # (h, w) pixels that see a white square or the margin, away from black squares
     blocked: Array  # (h, w) share of the surrounding's light that the circle blocks on the board
+    blocked_slope: Array  # (2, h, w) its slope along y and x, per px
 
     @staticmethod
     def around(image: NDArray[np.uint8], board: BoardMap, target: Target, half: float) -> _Patch | None:
@@ -121,12 +138,8 @@ class _Patch:
         margin = SQUARE_MARGIN_PX * np.linalg.norm(inverse, axis=1)
         distance = np.linalg.norm(squares, axis=-1) * target.square_mm
         blocked = blocked_share(distance, target.circle_radius_mm, target.circle_height_mm)
-        return _Patch(grey, x, y, _on_white(squares + at, margin, target), blocked)
-
-    @property
-    def blocked_slope(self) -> Array:
-        """(2, h, w) slope of `blocked` along y and x, per px."""
-        return np.stack(np.gradient(self.blocked))
+        slope_y, slope_x = np.gradient(blocked)
+        return _Patch(grey, x, y, _on_white(squares + at, margin, target), blocked, np.stack((slope_y, slope_x)))
 
     @property
     def points(self) -> Array:
@@ -154,7 +167,7 @@ def _search(patch: _Patch, rim: Array, foot: Array, parallax: Array, reach: floa
     return centres[best, 0], float(score[best]), parallax
 
 
-def _on_white(squares: Array, margin: Array, target: Target) -> NDArray[np.bool_]:
+def _on_white(squares: Array, margin: Array, target: Target) -> Mask:
     """(h, w) board coordinates (h, w, 2) that are `margin` (2,) away from black squares."""
     white = np.ones(squares.shape[:2], bool)
     for side_x in (-1.0, 0.0, 1.0):
@@ -165,7 +178,7 @@ def _on_white(squares: Array, margin: Array, target: Target) -> NDArray[np.bool_
     return white
 
 
-def _taking_part(patch: _Patch, ellipse: _Ellipse, centre: Array) -> NDArray[np.bool_]:
+def _taking_part(patch: _Patch, ellipse: _Ellipse, centre: Array) -> Mask:
     """(h, w) pixels of the fit: the ellipse's interior, and the band about its open side on white."""
     inverse = np.linalg.inv(ellipse.axes)
     unit = (patch.points - centre - ellipse.offset) @ inverse.T
@@ -179,7 +192,8 @@ def _taking_part(patch: _Patch, ellipse: _Ellipse, centre: Array) -> NDArray[np.
 
 def _fit(patch: _Patch, ellipse_at: Callable[[Array], _Ellipse], centre: Array) -> Circle | None:
     """Least squares of grey = dark + (bright, sloping) x (1 - blurred ellipse) over centre, size and blur."""
-    shape, step = np.array([*centre, 1.0, START_BLUR_PX]), np.full(4, np.inf)
+    shape = np.array([*centre, 1.0, START_BLUR_PX])
+    trust, residual, contrast = np.zeros(0), np.zeros(0), 0.0
     weights: Array | None = None
     for tolerance in TOLERANCES:
         ellipse = ellipse_at(shape[:2])
@@ -191,7 +205,9 @@ def _fit(patch: _Patch, ellipse_at: Callable[[Array], _Ellipse], centre: Array) 
             residual, contrast = _residual(patch, mask, ellipse, shape, trust)
             if contrast <= 0.0:
                 return None
-            columns = [(_residual(patch, mask, ellipse, shape + d, trust)[0] - residual) / 1e-4 for d in np.eye(4) * 1e-4]
+            columns = [
+                (_residual(patch, mask, ellipse, shape + d, trust)[0] - residual) / 1e-4 for d in np.eye(4) * 1e-4
+            ]
             jacobian = np.stack(columns, axis=1)
             normal = jacobian.T @ (jacobian * trust[:, None])
             normal += 1e-3 * np.diag(np.diag(normal)) + 1e-9 * np.eye(4)
@@ -205,9 +221,7 @@ def _fit(patch: _Patch, ellipse_at: Callable[[Array], _Ellipse], centre: Array) 
     return Circle(shape[:2], misfit)
 
 
-def _residual(
-    patch: _Patch, mask: NDArray[np.bool_], ellipse: _Ellipse, shape: Array, trust: Array
-) -> tuple[Array, float]:
+def _residual(patch: _Patch, mask: Mask, ellipse: _Ellipse, shape: Array, trust: Array) -> tuple[Array, float]:
     """Residuals of the pixels that take part, the grey coefficients solved along, and the step in grey."""
     open_board = 1.0 - _blurred_ellipse(patch, ellipse.axes * shape[2], shape[:2] + ellipse.offset, shape[3])
     # The blur of a product with a slope: F O + blur^2 grad F . grad O.

@@ -62,7 +62,9 @@ def detect(folder: Folder, workers: Workers = 1, quiet: Quiet = False) -> None:
     stages.run_detect(_open(folder), workers, Console(quiet=quiet))
 
 
-@app.command(epilog="Example: python -m pipelines estimate out/demo --points truth+noise --noise-px 0.4 --draws 5 --use four")
+@app.command(
+    epilog="Example: python -m pipelines estimate out/demo --points truth+noise --noise-px 0.4 --draws 5 --use four"
+)
 def estimate(
     folder: Folder,
     solver: Annotated[str, typer.Option(help="best, centred, eposit or posit.")] = "best",
@@ -130,6 +132,26 @@ def doctor() -> None:
         raise UserError("something that rendering needs is missing; see the lines marked MISSING")
 
 
+@app.command(epilog="Example: python -m pipelines bench demo --poses 3")
+def bench(
+    recipe: RecipeName = "demo",
+    poses: Annotated[int, typer.Option(min=1, help="Poses measured with each camera.")] = 3,
+) -> None:
+    """Frames per second, detection included, against a plain script that renders full frames."""
+    from datasets.recipe import load_recipe
+    from pipelines.bench.frames import measure, overall
+    from pipelines.doctor import versions
+
+    rows = measure(load_recipe(recipe)[0], poses)
+    table = Table(box=None, title=versions(), title_justify="left")
+    for title in ("camera", "ours, s", "of which detection, s", "plain full frame, s", "ratio"):
+        table.add_column(title, justify="right")
+    for row in rows:
+        table.add_row(row.camera, *(f"{x:.3f}" for x in (row.ours_s, row.detect_s, row.plain_s)), f"{row.ratio:.1f}")
+    Console().print(table)
+    typer.echo(f"all cameras together: {overall(rows):.1f} of our frames in the time of one plain frame")
+
+
 @app.command(epilog="Example: python -m pipelines recipes")
 def recipes() -> None:
     """List the recipes that come with the package."""
@@ -146,7 +168,9 @@ def recipes() -> None:
 
 
 @app.command(epilog="Example: python -m pipelines describe demo")
-def describe(recipe: Annotated[str | None, typer.Argument(metavar="[RECIPE]", help="Show its values beside the keys.")] = None) -> None:
+def describe(
+    recipe: Annotated[str | None, typer.Argument(metavar="[RECIPE]", help="Show its values beside the keys.")] = None,
+) -> None:
     """Every key of a recipe: default or value, and meaning."""
     from datasets.recipe import describe as keys
     from datasets.recipe import load_recipe, values

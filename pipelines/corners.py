@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eposit.arrays import Array, Mask
 from pipelines.board import Grey
-from pipelines.circle import Circle
 from pipelines.saddle import fit_saddles
-from pipelines.surface import Array, BoardMap, grid, leave_one_out
+from pipelines.surface import BoardMap, grid, leave_one_out
 from render.target import Target
 
 WINDOW_PX = 7  # half side of the pixels that a fit may use
@@ -28,12 +27,12 @@ class Corners:
     """Refined corners in the order of `Target.corners`."""
 
     points_px: Array  # (n, 2)
-    consistent: NDArray[np.bool_]  # (n,) agrees with the map through the others
+    consistent: Mask  # (n,) agrees with the map through the others
     blur_px: float  # median blur of the edges
 
 
-def refine_corners(image: Grey, board: BoardMap, circle: Circle | None, target: Target) -> Corners:
-    """Fit every corner near where `board` puts it, clear of the circle, and check each against the others."""
+def refine_corners(image: Grey, board: BoardMap, circle_px: Array, target: Target) -> Corners:
+    """Fit every corner near where `board` puts it, clear of the circle at `circle_px`, and check it by the others."""
     at = grid(target.inner)
     start, jacobian = board(at), board.jacobian(at)
     offsets = np.stack(np.meshgrid(*(np.arange(-WINDOW_PX, WINDOW_PX + 1),) * 2), axis=-1).reshape(-1, 2)
@@ -43,28 +42,31 @@ def refine_corners(image: Grey, board: BoardMap, circle: Circle | None, target: 
     relative = positions - start[:, None]
     squares = np.einsum("nij,npj->npi", np.linalg.inv(jacobian), relative)
     use = inside & (np.abs(squares).max(axis=-1) < WINDOW_SHARE) & (np.linalg.norm(relative, axis=-1) <= WINDOW_PX)
-    use &= ~_near_circle(positions.astype(np.float64), board, circle, target)
+    use &= ~_near_circle(positions.astype(np.float64), board, circle_px, target)
     # The normal of the edge along y is perpendicular to the image of the y direction, and so for x.
     angles = np.arctan2(-jacobian[:, 0, ::-1], jacobian[:, 1, ::-1])
-    fitted = fit_saddles(image[y, x].astype(np.float64), positions.astype(np.float64), use.astype(np.float64), angles, start)
+    fitted = fit_saddles(
+        image[y, x].astype(np.float64), positions.astype(np.float64), use.astype(np.float64), angles, start
+    )
     side = np.sqrt(np.abs(np.linalg.det(jacobian)))
     usable = (use.sum(axis=1) >= LEAST_PIXELS) & (fitted.moved_px <= START_LIMIT_SHARE * side)
-    return Corners(fitted.points_px, _consistent(fitted.points_px, usable, side, target.inner), float(np.median(fitted.blur_px)))
+    return Corners(
+        fitted.points_px, _consistent(fitted.points_px, usable, side, target.inner), float(np.median(fitted.blur_px))
+    )
 
 
-def _near_circle(positions: Array, board: BoardMap, circle: Circle | None, target: Target) -> NDArray[np.bool_]:
-    """(n, p) pixels on the circle or its shade; where the circle was not found, on either place where it may be."""
+def _near_circle(positions: Array, board: BoardMap, circle_px: Array, target: Target) -> Mask:
+    """(n, p) pixels on the circle or on its shade at its foot."""
     foot = target.circle_centre[:2] / target.square_mm
-    jacobian = board.jacobian(foot)
-    parallax = board.parallax(foot, target.circle_height_mm / target.square_mm)
-    centre = board(foot)[0]
-    places = [centre, *((circle.centre_px,) if circle else (centre + parallax, centre - parallax))]
-    inverse = np.linalg.inv(jacobian)
+    inverse = np.linalg.inv(board.jacobian(foot))
     radius = target.circle_radius_mm / target.square_mm + CIRCLE_MARGIN_PX * np.linalg.norm(inverse, axis=1).max()
-    return np.any([np.linalg.norm((positions - place) @ inverse.T, axis=-1) < radius for place in places], axis=0)
+    return np.any(
+        [np.linalg.norm((positions - place) @ inverse.T, axis=-1) < radius for place in (board(foot)[0], circle_px)],
+        axis=0,
+    )
 
 
-def _consistent(points: Array, usable: NDArray[np.bool_], side: Array, inner: tuple[int, int]) -> NDArray[np.bool_]:
+def _consistent(points: Array, usable: Mask, side: Array, inner: tuple[int, int]) -> Mask:
     """Drop the corner farthest from the map through the others until all the rest agree."""
     good = usable.copy()
     limit = np.maximum(LIMIT_PX, LIMIT_SHARE * side)

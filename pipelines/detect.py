@@ -1,4 +1,4 @@
-"""Stage 2: find the target's points in the images. It reads the PNG's bytes and the target's dimensions, nothing else."""
+"""Stage 2: find the target's points in the images, from the PNG's bytes and the target's dimensions alone."""
 
 from __future__ import annotations
 

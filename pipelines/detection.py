@@ -8,10 +8,11 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from eposit.arrays import Array
 from pipelines.board import Grey, find_board
-from pipelines.circle import find_circle
+from pipelines.circle import find_circle, locate_circle
 from pipelines.corners import BAD_SHARE, refine_corners
-from pipelines.surface import Array, BoardMap, grid
+from pipelines.surface import BoardMap, grid
 from render.target import Target
 
 CIRCLE_CLEARANCE = 1.3  # squares from the circle's foot within which the first, rough corners are not trusted
@@ -51,12 +52,10 @@ def detect_points(image: Grey, target: Target) -> Detection:
     foot = target.circle_centre[:2] / target.square_mm
     clear = np.linalg.norm(grid(target.inner) - foot, axis=1) > CIRCLE_CLEARANCE
     rough = BoardMap.fit(found.corners_px, target.inner, clear)
-    first = refine_corners(image, rough, find_circle(image, rough, target), target)
-    if np.mean(~first.consistent) > BAD_SHARE:
+    corners = refine_corners(image, rough, locate_circle(image, rough, target), target)
+    if np.mean(~corners.consistent) > BAD_SHARE:
         return _nothing(count, PointStatus.CORNERS_INCONSISTENT, found.finder)
-    board = BoardMap.fit(first.points_px, target.inner, first.consistent)
-    circle = find_circle(image, board, target)
-    corners = refine_corners(image, board, circle, target)
+    circle = find_circle(image, BoardMap.fit(corners.points_px, target.inner, corners.consistent), target)
     points = np.vstack((corners.points_px, circle.centre_px if circle else np.full(2, np.nan)))
     status = np.array([PointStatus.OK] * count, dtype="<U24")
     status[:-1][~corners.consistent] = PointStatus.CORNERS_INCONSISTENT

@@ -26,6 +26,13 @@ def diagnose() -> list[tuple[str, bool, str]]:
     return rows
 
 
+def versions() -> str:
+    """Libraries and machine in one line."""
+    found = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in LIBRARIES)
+    system = f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores"
+    return f"Python {platform.python_version()}, {found}; {system}"
+
+
 def _library(name: str) -> tuple[str, bool, str]:
     try:
         return name, True, importlib.metadata.version(name)
@@ -47,7 +54,11 @@ def _lab() -> tuple[str, bool, str]:
 
     ours = Path(__file__).resolve().parents[1]
     fine = Path(datasets.__file__ or "").resolve().is_relative_to(ours)
-    return "datasets", fine, "from this checkout" if fine else f"{datasets.__file__} is another package; use a venv of its own"
+    return (
+        "datasets",
+        fine,
+        "from this checkout" if fine else f"{datasets.__file__} is another package; use a venv of its own",
+    )
 
 
 def _render() -> tuple[str, bool, str]:

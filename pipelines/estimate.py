@@ -8,7 +8,6 @@ from typing import Annotated, Any
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 
 import eposit
 from datasets.errors import UserError
@@ -16,10 +15,10 @@ from datasets.plan import Stream, rng_for
 from datasets.schema import ESTIMATES, FRAMES
 from datasets.store import Dataset
 from eposit import Camera, Solution
+from eposit.arrays import Array
 from pipelines import generate
 from pipelines.rows import camera_of, points_by_frame, pose_columns, table
 
-Array = NDArray[np.float64]
 POINTS = ("detected", "truth", "truth+noise")
 CAMERAS = ("exact", "nominal", "paper")
 USES = ("four", "all")
@@ -86,7 +85,9 @@ def _estimate(dataset: Dataset, frame: dict[str, Any], points_px: Array, setting
     chosen = np.array(dataset.recipe.four_indices()) if setting.use == "four" else np.arange(len(target.points))
     noisy = setting.points == "truth+noise"
     draws = range(setting.draws if noisy else 1)
-    batch = np.stack([points_px + _noise(dataset, frame, draw, setting) if noisy else points_px for draw in draws])[:, chosen]
+    batch = np.stack([points_px + _noise(dataset, frame, draw, setting) if noisy else points_px for draw in draws])[
+        :, chosen
+    ]
     found = np.all(np.isfinite(batch[0]), axis=1)
     if setting.use == "all":  # a point that was not found takes no part; of four, none may be missing
         chosen, batch = chosen[found], batch[:, found]

@@ -52,8 +52,12 @@ def _frame_row(dataset: Dataset, frame: Frame) -> dict[str, object]:
     image = develop(master.full(camera), recipe.sensor)
     coefficients = np.zeros(4)
     coefficients[: len(spec.coefficients)] = spec.coefficients
-    region = dict(zip(("region_x_px", "region_y_px", "region_width_px", "region_height_px"), master.region, strict=True))
-    pose = {name: values[0] for name, values in pose_columns(frame.cam_from_obj.R[None], frame.cam_from_obj.t[None]).items()}
+    region = dict(
+        zip(("region_x_px", "region_y_px", "region_width_px", "region_height_px"), master.region, strict=True)
+    )
+    pose = {
+        name: values[0] for name, values in pose_columns(frame.cam_from_obj.R[None], frame.cam_from_obj.t[None]).items()
+    }
     return {
         "frame_id": frame.frame_id,
         "pose_id": frame.pose_id,

@@ -6,17 +6,17 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 
 from eposit import Camera, Pose
+from eposit.arrays import Array
 from render.target import Target
-
-Array = NDArray[np.float64]
 
 
 def table(schema: pa.Schema, columns: dict[str, Any]) -> pa.Table:
     """A table of `schema` from a mapping of columns."""
-    return pa.table([pa.array(columns[field.name], type=field.type, from_pandas=False) for field in schema], schema=schema)
+    return pa.table(
+        [pa.array(columns[field.name], type=field.type, from_pandas=False) for field in schema], schema=schema
+    )
 
 
 def pose_columns(R: Array, t: Array) -> dict[str, Array]:

@@ -9,10 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import erf
 
-Array = NDArray[np.float64]
+from eposit.arrays import Array
 
 START_BLUR_PX = 0.8
 BLUR_LIMITS_PX = (0.2, 6.0)

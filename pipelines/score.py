@@ -47,7 +47,10 @@ def run_shard(dataset: Dataset, estimates: Path) -> None:
         "reprojection_rmse_px": rows["reprojection_rmse_px"],
         "star": star,
     }
-    arrays = {name: value.combine_chunks() if hasattr(value, "combine_chunks") else value for name, value in (columns | scores).items()}
+    arrays = {
+        name: value.combine_chunks() if hasattr(value, "combine_chunks") else value
+        for name, value in (columns | scores).items()
+    }
     dataset.write_shard(_path(dataset, estimates), table(SCORES, arrays))
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import closing
 from typing import TypeVar
 
 from rich.console import Console
@@ -90,7 +89,6 @@ def _run(
     )  # fmt: skip
     with Progress(*columns, console=console, disable=console.quiet) as progress:
         bar = progress.add_task(name, total=len(shards), completed=len(shards) - len(missing))
-        with closing(map_shards(functools.partial(run_shard, dataset), missing, workers)) as done:
-            for _ in done:
-                progress.advance(bar)
+        for _ in map_shards(functools.partial(run_shard, dataset), missing, workers):
+            progress.advance(bar)
     dataset.write_manifest()

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from eposit.arrays import Array, Mask
 
 DEGREE = 4  # leaves 0.01 px on a fish-eye board 500 px wide
 
@@ -20,7 +19,7 @@ class BoardMap:
     inner: tuple[int, int]  # inner corners along x and y
 
     @staticmethod
-    def fit(corners_px: Array, inner: tuple[int, int], use: NDArray[np.bool_] | None = None) -> BoardMap:
+    def fit(corners_px: Array, inner: tuple[int, int], use: Mask | None = None) -> BoardMap:
         """Least squares over (n, 2) corners, or over those in the (n,) mask."""
         use = np.ones(len(corners_px), bool) if use is None else use
         basis = _basis(inner, grid(inner))
@@ -60,7 +59,7 @@ def grid(inner: tuple[int, int]) -> Array:
     return np.stack((x.ravel(), y.ravel()), axis=1).astype(np.float64)
 
 
-def leave_one_out(corners_px: Array, inner: tuple[int, int], use: NDArray[np.bool_]) -> Array:
+def leave_one_out(corners_px: Array, inner: tuple[int, int], use: Mask) -> Array:
     """(n,) distance of each corner from the map fitted to the others in the (n,) mask, px."""
     basis = _basis(inner, grid(inner))
     coefficients = np.linalg.pinv(basis[use])

@@ -1,4 +1,4 @@
-"""The one door to Mitsuba and Dr.Jit: finds a usable LLVM or GPU, fixes the variant, registers our plugins.
+"""The one door to Mitsuba and Dr.Jit: finds a usable LLVM or GPU, fixes the variant, registers our sensor.
 
 Dr.Jit compiles its kernels with an LLVM library that it loads at run time. Versions below 19 abort the whole process
 at the first `maximum` ("Cannot select: fmaximum"), so the library is found and checked before Dr.Jit is imported.
@@ -21,7 +21,9 @@ CPU_VARIANT = "llvm_ad_mono"
 CUDA_VARIANT = "cuda_ad_mono"
 VARIANTS = (CPU_VARIANT, CUDA_VARIANT)
 LIBRARY_VARIABLE = "DRJIT_LIBLLVM_PATH"
-ADVICE = f"install one with `pip install karellen-llvm-core`, or set {LIBRARY_VARIABLE} to libLLVM {MINIMUM_LLVM} or later"
+ADVICE = (
+    f"install one with `pip install karellen-llvm-core`, or set {LIBRARY_VARIABLE} to libLLVM {MINIMUM_LLVM} or later"
+)
 
 
 class BackendError(RuntimeError):
@@ -71,7 +73,7 @@ def cuda_present() -> bool:
 
 @functools.cache
 def load() -> Any:
-    """Mitsuba with its variant fixed for this process and our sensor and integrator registered.
+    """Mitsuba with its variant fixed for this process and our sensor registered.
 
     `EPOSIT_VARIANT` chooses between llvm_ad_mono and cuda_ad_mono; without it a CUDA GPU is used where there is one.
 
@@ -94,10 +96,8 @@ def load() -> Any:
     mi.set_variant(variant)
     mi.set_log_level(mi.LogLevel.Error)
     from render.sensor import register_sensor
-    from render.shading import register_integrator
 
     register_sensor(mi)
-    register_integrator(mi)
     return mi
 
 
@@ -108,9 +108,7 @@ def _checked_choice(library: Path) -> Path:
     if version is None:
         raise BackendError(f"{LIBRARY_VARIABLE} names {str(library)!r}, which is not an LLVM library; {ADVICE}")
     if version < MINIMUM_LLVM:
-        raise BackendError(
-            f"{LIBRARY_VARIABLE} names LLVM {version}, which would abort the process; {ADVICE}"
-        )
+        raise BackendError(f"{LIBRARY_VARIABLE} names LLVM {version}, which would abort the process; {ADVICE}")
     return library
 
 

@@ -22,7 +22,9 @@ class SensorModel:
         ValueError: an exposure, point spread or gamma out of range.
     """
 
-    exposure: Annotated[float, "grey value, as a share of full scale, of radiance 1: the white board at its centre"] = 0.8
+    exposure: Annotated[float, "grey value, as a share of full scale, of radiance 1: the white board at its centre"] = (
+        0.8
+    )
     psf_sigma_px: Annotated[float, "standard deviation of the gaussian point spread, px; 0 for none"] = 0.7
     gamma: Annotated[float, "grey = linear ** (1 / gamma); 1 is a linear camera, 2.2 a display-like one"] = 1.0
 
@@ -62,4 +64,4 @@ def decode_png(data: bytes) -> NDArray[np.uint8]:
     image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
     if image is None or image.ndim != 2 or image.dtype != np.uint8:
         raise ValueError("the image is not an 8-bit grey PNG")
-    return image
+    return image.astype(np.uint8, copy=False)

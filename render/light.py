@@ -10,7 +10,8 @@ from typing import Annotated
 
 import numpy as np
 
-from render.target import Array, Target
+from eposit.arrays import Array
+from render.target import Target
 
 GRID_MM = 1.0  # spacing of the irradiance map, mm; the narrowest penumbra of the default lamp is 3 mm wide
 LAMP_SAMPLES = 48  # lamp positions along each side for the circle's shadow
@@ -25,7 +26,11 @@ class Light:
         ValueError: a lamp behind the board, a size that is not positive, or a share outside [0, 1].
     """
 
-    lamp_position_mm: Annotated[tuple[float, float, float], "lamp's centre in the object frame, mm"] = (-400.0, -900.0, -2600.0)
+    lamp_position_mm: Annotated[tuple[float, float, float], "lamp's centre in the object frame, mm"] = (
+        -400.0,
+        -900.0,
+        -2600.0,
+    )
     lamp_side_mm: Annotated[float, "side of the square lamp, which faces the board's centre, mm"] = 900.0
     ambient_share: Annotated[float, "share of the even surrounding in the light at the board's centre, 0 to 1"] = 0.3
     background: Annotated[float, "radiance of what lies behind the board; 1 is the white board at its centre"] = 0.3
@@ -33,7 +38,7 @@ class Light:
     def __post_init__(self) -> None:
         if not self.lamp_position_mm[2] < 0.0:
             raise ValueError(
-                f"light lamp_position_mm has z = {self.lamp_position_mm[2]}; the lamp stands in front of the board at z < 0"
+                f"light lamp_position_mm has z = {self.lamp_position_mm[2]}; the lamp stands in front at z < 0"
             )
         if not self.lamp_side_mm > 0.0:
             raise ValueError(f"light lamp_side_mm is {self.lamp_side_mm}; it must be above 0 mm")
@@ -67,10 +72,8 @@ def shading_map(target: Target, light: Light) -> tuple[Array, float]:
     points = np.stack((*np.meshgrid(x, y), np.zeros((ny, nx))), axis=-1)
     lamp = _smooth_lamp(target, light, points)
     centre = target.circle_centre
-    slopes = (light.lamp_corners(target) - centre)[:, :2] / light.lamp_corners(target)[:, 2:]
-    reach = target.circle_radius_mm + 1.5 * target.circle_height_mm * np.max(np.linalg.norm(slopes, axis=1))
     distance = np.hypot(points[..., 0] - centre[0], points[..., 1] - centre[1])
-    near = distance < reach + 2.0 * GRID_MM
+    near = distance < shade_radius(target, light)
     lamp[near] = lamp_irradiance(target, light, points[near], LAMP_SAMPLES, shadowed=True)
     blocked = blocked_share(distance, target.circle_radius_mm, target.circle_height_mm)
     ambient = 1.0 - blocked - lamp / np.pi  # neither the circle nor the lamp lets it through
@@ -79,6 +82,13 @@ def shading_map(target: Target, light: Light) -> tuple[Array, float]:
     lamp_scale = (1.0 - light.ambient_share) / lamp_here / target.white
     ambient_scale = light.ambient_share / ambient_here / target.white
     return lamp_scale * lamp + ambient_scale * ambient, lamp_scale * disc + ambient_scale * (1.0 - disc / np.pi)
+
+
+def shade_radius(target: Target, light: Light) -> float:
+    """Distance from the circle's axis, mm, within which the lamp's shadow of it lies on the board."""
+    to_lamp = light.lamp_corners(target) - target.circle_centre
+    slope = np.max(np.linalg.norm(to_lamp[:, :2] / to_lamp[:, 2:], axis=1))
+    return float(target.circle_radius_mm + 1.1 * target.circle_height_mm * slope + 2.0 * GRID_MM)
 
 
 def reference_irradiance(target: Target, light: Light) -> tuple[float, float]:
@@ -94,7 +104,9 @@ def _smooth_lamp(target: Target, light: Light, points: Array) -> Array:
     iy, ix = np.arange(0, rows + step, step), np.arange(0, columns + step, step)
     origin, dx, dy = points[0, 0], points[0, 1] - points[0, 0], points[1, 0] - points[0, 0]
     coarse = origin + ix[None, :, None] * dx + iy[:, None, None] * dy
-    values = lamp_irradiance(target, light, coarse.reshape(-1, 3), SMOOTH_SAMPLES, shadowed=False).reshape(coarse.shape[:2])
+    values = lamp_irradiance(target, light, coarse.reshape(-1, 3), SMOOTH_SAMPLES, shadowed=False).reshape(
+        coarse.shape[:2]
+    )
     across = np.stack([np.interp(np.arange(columns), ix, row) for row in values])
     return np.stack([np.interp(np.arange(rows), iy, column) for column in across.T], axis=1)
 

@@ -14,15 +14,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eposit import Camera, Pose
+from eposit.arrays import Array, Mask
 from render import backend
-from render.light import Light
+from render.light import Light, shade_radius
 from render.scene import lookup_scene, reference_scene
 from render.sensor import sensor_dict
 from render.target import Target
+from render.trace import trace
 
 Image = NDArray[np.float32]
 Region = tuple[int, int, int, int]  # x, y, width, height, px
 REGION_MARGIN = 8  # px around the target's outline; a point spread of 1.5 px needs 6
+EDGE_MARGIN = 1  # px around a traced edge: rounding and the half-pixel steps stay within it
+SMOOTH_SAMPLES = 4  # rays for a pixel without an edge: shading bends too little within a pixel for more
 RIM_SAMPLES = 16  # subpixels along each side on the image circle's rim
 
 
@@ -79,15 +83,90 @@ def render_master(
     samples: rays per pixel, a square number (multijittered). seed: 32 bits; the same seed gives the same bits.
     region: pixels to render, by default the target's. reference: Mitsuba's direct light instead of the looked-up one.
     """
-    mi = backend.load()
     region = target_region(target, camera, cam_from_obj) if region is None else region
-    scene = (reference_scene if reference else lookup_scene)(target, light)
-    sensor = mi.load_dict(sensor_dict(camera, cam_from_obj, region, samples))
-    film = np.array(mi.render(scene, sensor=sensor, spp=samples, seed=seed & 0xFFFFFFFF))
     x, y, width, height = region
+    film = _film(target, light, camera, cam_from_obj, region, samples, seed, reference)
     behind = lens_coverage(camera)[y : y + height, x : x + width] - film[..., 1]
     radiance = film[..., 0] + np.float32(light.background) * np.maximum(behind, 0.0)
     return Master(radiance.astype(np.float32), region, light.background)
+
+
+def _film(
+    target: Target,
+    light: Light,
+    camera: Camera,
+    cam_from_obj: Pose,
+    region: Region,
+    samples: int,
+    seed: int,
+    reference: bool,
+) -> Image:
+    """(height, width, 2) radiance and share of hits in the region."""
+    mi = backend.load()
+    if reference:
+        sensor = mi.load_dict(sensor_dict(camera, cam_from_obj, region, samples))
+        return np.array(mi.render(reference_scene(target, light), sensor=sensor, spp=samples, seed=seed & 0xFFFFFFFF))
+    whole = (0, 0, camera.width, camera.height)
+    sensor = mi.load_dict(sensor_dict(camera, cam_from_obj, whole, samples))
+    x, y, width, height = region
+    edges = edge_pixels(target, light, camera, cam_from_obj, region).ravel()
+    column, row = np.meshgrid(np.arange(x, x + width), np.arange(y, y + height))
+    pixels = (row * camera.width + column).astype(np.uint32).ravel()
+    film = np.empty((len(pixels), 2), np.float32)
+    for chosen, count in ((edges, samples), (~edges, min(samples, SMOOTH_SAMPLES))):
+        picture = (camera.width, camera.height)
+        film[chosen] = trace(lookup_scene(target, light), sensor, pixels[chosen], picture, count, seed)
+    return film.reshape(height, width, 2)
+
+
+def edge_pixels(target: Target, light: Light, camera: Camera, cam_from_obj: Pose, region: Region) -> Mask:
+    """(height, width) pixels of the region where brightness jumps or bends: edges of the target, the circle's shade.
+
+    Pixels on the rim of the lens's image circle count too. Edges are followed in steps of at most half a pixel.
+    """
+    x, y, width, height = region
+    mask = np.zeros((height + 2 * EDGE_MARGIN, width + 2 * EDGE_MARGIN), bool)
+    for line in [*target.edges(), *_shade_rings(target, light, camera, cam_from_obj)]:
+        pixels = _dense(camera, cam_from_obj, line)
+        if pixels is None:
+            return np.ones((height, width), bool)  # part of the target is beyond the lens: no map of its edges
+        column, row = (np.rint(pixels) - (x, y)).astype(int).T + EDGE_MARGIN
+        inside = (column >= 0) & (column < mask.shape[1]) & (row >= 0) & (row < mask.shape[0])
+        mask[row[inside], column[inside]] = True
+    grown = np.zeros_like(mask)
+    for dy in range(-EDGE_MARGIN, EDGE_MARGIN + 1):
+        for dx in range(-EDGE_MARGIN, EDGE_MARGIN + 1):
+            grown |= np.roll(mask, (dy, dx), axis=(0, 1))
+    coverage = lens_coverage(camera)[y : y + height, x : x + width]
+    inner = grown[EDGE_MARGIN : EDGE_MARGIN + height, EDGE_MARGIN : EDGE_MARGIN + width]
+    return inner | ((coverage > 0.0) & (coverage < 1.0))
+
+
+def _shade_rings(target: Target, light: Light, camera: Camera, cam_from_obj: Pose) -> list[Array]:
+    """Circles (n, 3), mm, on the board that cover the circle's shade, less than a pixel apart."""
+    foot = target.circle_centre * (1.0, 1.0, 0.0)
+    radius = shade_radius(target, light)
+    border = foot + (target.circle_rim() - target.circle_centre) * (radius / target.circle_radius_mm)
+    outer, middle = (camera.project(cam_from_obj.apply(points)) for points in (border, foot[None]))
+    span = np.linalg.norm(outer - middle, axis=1)
+    if np.any(np.isnan(span)):
+        return []
+    shares = np.linspace(0.0, 1.0, int(1.5 * span.max()) + 2)[1:]
+    closed = np.vstack((border, border[:1]))
+    return [foot + share * (closed - foot) for share in shares]
+
+
+def _dense(camera: Camera, cam_from_obj: Pose, line: Array) -> Array | None:
+    """(n, 2) px along an edge, at most half a pixel apart; None where the lens does not see all of it."""
+    at = np.linspace(0.0, len(line) - 1.0, max(2, len(line)))
+    for _ in range(2):
+        points = np.stack([np.interp(at, np.arange(len(line)), column) for column in line.T], axis=1)
+        pixels = camera.project(cam_from_obj.apply(points))
+        if np.any(np.isnan(pixels)):
+            return None
+        gap = float(np.linalg.norm(np.diff(pixels, axis=0), axis=1).max())
+        at = np.linspace(0.0, len(line) - 1.0, int(len(at) * max(1.0, 2.5 * gap)) + 1)
+    return pixels
 
 
 @functools.lru_cache(maxsize=8)
@@ -145,7 +224,9 @@ def read_master(path: Path, key: str = "") -> Master:
         with OpenEXR.File(str(path)) as file:
             header, channels = file.header(), file.channels()
             if header["key"] != key:
-                raise MasterError(f"{path} belongs to another frame or recipe; delete it and run the generate stage again")
+                raise MasterError(
+                    f"{path} belongs to another frame or recipe; delete it and run the generate stage again"
+                )
             (low, high), radiance = header["dataWindow"], channels["Y"].pixels
             region = (int(low[0]), int(low[1]), int(high[0] - low[0] + 1), int(high[1] - low[1] + 1))
             return Master(np.array(radiance, np.float32), region, float(header["background"]))

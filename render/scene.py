@@ -9,19 +9,17 @@ import numpy as np
 
 from render import backend
 from render.light import Light, reference_irradiance, shading_map
-from render.shading import INTEGRATOR
 from render.target import Target
 
 
 @functools.lru_cache(maxsize=4)
 def lookup_scene(target: Target, light: Light) -> Any:
-    """The board with its light looked up from a map: primary rays only, no noise of shading."""
+    """The board with its light looked up from a map, for `render.trace`: primary rays only, no noise of shading."""
     mi = backend.load()
     board, circle = shading_map(target, light)
     return mi.load_dict(
         {
             "type": "scene",
-            "integrator": {"type": INTEGRATOR},
             "board": {**_board(mi, target), "shading": _smooth_texture(mi, board)},
             "circle": {**_circle(mi, target), "shading": {"type": "uniform", "value": circle}},
         }
@@ -67,7 +65,7 @@ def _board(mi: Any, target: Target) -> dict[str, Any]:
     x0, x1, y0, y1 = target.extent_mm
     transform = mi.ScalarTransform4f
     centre = [(x0 + x1) / 2.0, (y0 + y1) / 2.0, 0.0]
-    # The texture is one texel per square with one ring of margin, clamped beyond: its own extent differs from the board's.
+    # One texel per square with one ring of margin, clamped beyond: the texture's extent differs from the board's.
     square = target.square_mm
     width, height = (target.columns + 2) * square, (target.rows + 2) * square
     to_uv = transform().translate([(x0 + 2.0 * square) / width, (y0 + 2.0 * square) / height, 0.0])

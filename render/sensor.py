@@ -92,7 +92,9 @@ def register_sensor(mi: Any) -> None:
             ray.maxt = dr.select(seen, dr.largest(mi.Float), 0.0)
             return ray, dr.select(seen, mi.Spectrum(1.0), mi.Spectrum(0.0))
 
-        def sample_ray_differential(self, time: Any, sample1: Any, sample2: Any, sample3: Any, active: Any = True) -> Any:
+        def sample_ray_differential(
+            self, time: Any, sample1: Any, sample2: Any, sample3: Any, active: Any = True
+        ) -> Any:
             ray, weight = self.sample_ray(time, sample1, sample2, sample3, active)
             return mi.RayDifferential3f(ray), weight
 

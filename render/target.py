@@ -13,7 +13,8 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from eposit.arrays import Array
+
 CIRCLE = "circle"
 
 
@@ -118,7 +119,7 @@ class Target:
             return int(point[1]) * across + int(point[0])
         shown = repr(point) if isinstance(point, str) else str(list(point))
         raise ValueError(
-            f"target has no point {shown}; give \"circle\" or an inner corner [column, row] with column 0 to "
+            f'target has no point {shown}; give "circle" or an inner corner [column, row] with column 0 to '
             f"{across - 1} and row 0 to {down - 1}"
         )
 
@@ -135,6 +136,22 @@ class Target:
         border = np.column_stack((np.vstack(sides), np.zeros(4 * steps)))
         return np.vstack((border, self.circle_rim(steps)))
 
+    def edges(self, steps: int = 33) -> list[Array]:
+        """Lines (n, 3), mm, where the target's brightness jumps: borders of squares and board, the circle's rim."""
+        x0, x1, y0, y1 = self.extent_mm
+        s = np.linspace(0.0, 1.0, steps)
+        left, top = -self.square_mm, -self.square_mm
+        right, bottom = left + self.columns * self.square_mm, top + self.rows * self.square_mm
+        upright = [(left + i * self.square_mm, top, bottom) for i in range(self.columns + 1)] + [
+            (x0, y0, y1),
+            (x1, y0, y1),
+        ]
+        level = [(top + i * self.square_mm, left, right) for i in range(self.rows + 1)] + [(y0, x0, x1), (y1, x0, x1)]
+        lines = [np.stack((np.full(steps, x), a + (b - a) * s, 0.0 * s), axis=1) for x, a, b in upright]
+        lines += [np.stack((a + (b - a) * s, np.full(steps, y), 0.0 * s), axis=1) for y, a, b in level]
+        rim = self.circle_rim()
+        return [*lines, np.vstack((rim, rim[:1]))]
+
     def circle_rim(self, steps: int = 256) -> Array:
         """(steps, 3) points on the circle's rim, mm."""
         angle = np.arange(steps) * (2.0 * np.pi / steps)
@@ -142,7 +159,7 @@ class Target:
         return rim + self.circle_centre
 
     def reflectance(self) -> NDArray[np.float32]:
-        """Reflectance, one texel per square with the margin as a ring of texels, row 1 first; see `texture_extent_mm`."""
+        """Reflectance, one texel per square with the margin as one ring of texels, row 1 first."""
         column, row = np.meshgrid(np.arange(self.columns), np.arange(self.rows))
         squares = np.where((column + row) % 2 == 0, self.black, self.white)
         return np.pad(squares, 1, constant_values=self.white).astype(np.float32)

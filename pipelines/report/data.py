@@ -10,8 +10,8 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from datasets.store import Dataset
+from eposit.arrays import Array, Mask
 
-Array = NDArray[np.float64]
 ERRORS = {
     "rotation_error_deg": "rotation, deg",
     "rx_error_deg": "rx, deg",
@@ -34,8 +34,8 @@ class Series:
     name: str
     frame_id: NDArray[np.int64]
     errors: dict[str, Array]  # column to values, NaN for failures
-    failed: NDArray[np.bool_]
-    star: NDArray[np.bool_]
+    failed: Mask
+    star: Mask
 
 
 def series(scores: pa.Table) -> list[Series]:
@@ -72,7 +72,9 @@ def detection_rows(dataset: Dataset, frames: list[dict[str, Any]]) -> list[dict[
     target = dataset.recipe.target
     n = len(target.points)
     truth, found = dataset.read("keypoints"), dataset.read("detections")
-    error = np.stack([found[f"{a}_px"].to_numpy() - truth[f"{a}_px"].to_numpy() for a in "xy"], axis=1).reshape(-1, n, 2)
+    error = np.stack([found[f"{a}_px"].to_numpy() - truth[f"{a}_px"].to_numpy() for a in "xy"], axis=1).reshape(
+        -1, n, 2
+    )
     ok = (found["status"].to_numpy(zero_copy_only=False) == "ok").reshape(-1, n)
     tilt = np.array([frame["tilt_deg"] for frame in frames])
     camera = np.array([frame["camera_name"] for frame in frames])

@@ -1,4 +1,4 @@
-"""Figures of the report, each as one SVG text. Matplotlib's hash salt and dates are fixed, so equal data give equal text."""
+"""Figures of the report, each as one SVG text. Salt and dates are fixed, so that equal data give equal text."""
 
 from __future__ import annotations
 
@@ -11,13 +11,20 @@ import matplotlib
 import numpy as np
 
 matplotlib.use("svg")
-import matplotlib.pyplot as plt  # noqa: E402
-from matplotlib.figure import Figure  # noqa: E402
+import matplotlib.pyplot as plt
+from matplotlib.figure import Figure
 
-from pipelines.report.data import ERRORS, Array, Series  # noqa: E402
-from render.develop import encode_png  # noqa: E402
+from eposit.arrays import Array
+from pipelines.report.data import ERRORS, Series
+from render.develop import encode_png
 
-STYLE = {"svg.hashsalt": "eposit", "font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "svg.fonttype": "none"}
+STYLE: Any = {
+    "svg.hashsalt": "eposit",
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "svg.fonttype": "none",
+}
 BOXES = ("rx_error_deg", "ry_error_deg", "rz_error_deg", "tx_error_mm", "ty_error_mm", "tz_error_mm")
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
-import platform
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +9,7 @@ import jinja2
 import numpy as np
 
 from datasets.store import RECIPE_FILE, Dataset, refused
+from pipelines.doctor import versions
 from pipelines.report import figures
 from pipelines.report.data import ERRORS, detection_rows, score_rows, series
 from pipelines.rows import points_by_frame
@@ -19,7 +18,6 @@ from render.files import replace_atomically
 
 REPORT = "report.html"
 GALLERY = 15  # pictures at most
-VERSIONS = ("mitsuba", "drjit", "numpy", "scipy", "opencv-python-headless", "OpenEXR", "pyarrow")
 
 
 def write_report(dataset: Dataset) -> Path:
@@ -28,7 +26,13 @@ def write_report(dataset: Dataset) -> Path:
     Raises:
         UserError: a stage is missing or a shard damaged.
     """
-    columns = ["frame_id", "time_s", "camera_name", "tilt_deg", *(f"region_{a}_px" for a in ("x", "y", "width", "height"))]
+    columns = [
+        "frame_id",
+        "time_s",
+        "camera_name",
+        "tilt_deg",
+        *(f"region_{a}_px" for a in ("x", "y", "width", "height")),
+    ]
     frames = dataset.read("frames", columns).to_pylist()
     by_id = {frame["frame_id"]: frame for frame in frames}
     found = series(dataset.read("scores"))
@@ -48,8 +52,7 @@ def write_report(dataset: Dataset) -> Path:
         ],
         errors=ERRORS,
         scores=score_rows(found, {frame["frame_id"]: frame["camera_name"] for frame in frames}),
-        versions={name: importlib.metadata.version(name) for name in VERSIONS},
-        machine=f"Python {platform.python_version()}, {platform.system()} {platform.machine()}",
+        versions=versions(),
     )
     path = dataset.root / REPORT
     try:
@@ -82,5 +85,5 @@ def _gallery(dataset: Dataset, frames: list[dict[str, Any]]) -> list[dict[str, A
 
 def _number(value: float | None) -> str:
     if value is None or not np.isfinite(value):
-        return "–"
+        return "\N{EN DASH}"
     return f"{value:.3g}" if abs(value) >= 1e-4 or value == 0.0 else f"{value:.1e}"

@@ -1,0 +1,55 @@
+# Everything sets itself up: a machine needs Python >= 3.11 with venv, and make.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+SETUP := $(VENV)/.done
+
+.PHONY: help setup demo test test-full check-slow lint types layers bench wheel lock clean
+
+help:  ## this list
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 14
+
+setup: $(SETUP)  ## the lab's environment in .venv
+
+$(SETUP): requirements.txt pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or later is needed; set PYTHON=...")'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.txt
+	@$(BIN)/python tools/link.py
+	@touch $@
+
+demo: $(SETUP)  ## 40 rendered frames, poses and out/demo/report.html
+	$(BIN)/python -m pipelines demo --out out/demo
+
+test: $(SETUP)  ## the tests that need pip only, under 10 minutes on 2 cores
+	$(BIN)/python -m pytest -m "not full and not slow"
+
+test-full: $(SETUP)  ## adds other environments: the built wheel alone
+	$(BIN)/python -m pytest -m full
+
+check-slow: $(SETUP)  ## kills in every stage, large samples; writes docs/evidence
+	$(BIN)/python -m pytest -m slow
+
+lint: $(SETUP)  ## ruff
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: $(SETUP)  ## pyright, strict on eposit
+	$(BIN)/basedpyright
+
+layers: $(SETUP)  ## the layer contract
+	PYTHONPATH=. $(BIN)/lint-imports
+
+bench: $(SETUP)  ## speed, as ratios measured side by side in one run
+	$(BIN)/python -m pipelines bench
+
+wheel: $(SETUP)  ## the library `eposit` as a wheel in dist/
+	$(BIN)/python -m build --wheel --no-isolation
+
+lock: $(SETUP)  ## pin every dependency again
+	$(BIN)/python -m pip install --quiet uv
+	$(BIN)/uv pip compile --generate-hashes --no-emit-index-url --no-annotate --no-header --universal --python-version 3.11 \
+		--extra lab --extra dev --quiet -o requirements.txt pyproject.toml requirements-build.in
+
+clean:  ## everything that was made
+	rm -rf $(VENV) out build dist *.egg-info
