@@ -25,6 +25,7 @@ from render.target import CIRCLE, Target
 RECIPES = resources.files("datasets") / "recipes"
 SUFFIX = ".toml"
 MAX_PIXELS = 100_000_000
+UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")  # Pydantic's types of fault
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -212,14 +213,14 @@ def _known() -> str:
 
 def _sentence(error: ValidationError) -> str:
     """The first fault of a validation as one sentence with the key's path."""
-    # A union reports every branch; the branch that came furthest says most.
-    first = error.errors(include_url=False)[0]
+    # A misspelt key is missing under its right name as well: what is unknown comes first.
+    first = min(error.errors(include_url=False), key=lambda fault: fault["type"] not in UNKNOWN_KEY)
     path = [
         str(part) for part in first["loc"] if not (isinstance(part, str) and part.startswith(("tuple[", "literal[")))
     ]
     key = ".".join(path) or "recipe"
     kind, given = first["type"], first.get("input")
-    if kind in ("extra_forbidden", "unexpected_keyword_argument"):
+    if kind in UNKNOWN_KEY:
         known = _keys_beside(path)
         close = difflib.get_close_matches(path[-1], known, n=1)
         hint = f" (did you mean {close[0]!r}?)" if close else ""

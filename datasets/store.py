@@ -9,15 +9,17 @@ from __future__ import annotations
 import errno
 import json
 import os
+import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from datasets.errors import UserError
 from datasets.identity import table_digest
-from datasets.recipe import Recipe, load_recipe, parse_recipe
+from datasets.recipe import Recipe, load_recipe
 from datasets.schema import SCHEMA_VERSION, TABLES, dictionary
 from render.files import TEMPORARY_PREFIX, replace_atomically
 
@@ -26,6 +28,7 @@ MANIFEST_FILE = "manifest.json"
 CARD_FILE = "README.md"
 MASTERS = "masters"
 RECIPE_KEY, VERSION_KEY, DIGEST_KEY = b"recipe", b"schema_version", b"content"
+SHARD_NAME = re.compile(r"([^.].*)-\d{5,}-of-(\d{5,})\.parquet")  # temporary and foreign files have other names
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,8 @@ class Dataset:
             return False
         try:
             return self._footer_problem(pq.read_metadata(path).metadata or {}) is None
+        except PermissionError:
+            raise unreadable(path) from None
         except (pa.ArrowInvalid, OSError):
             return False
 
@@ -72,14 +77,16 @@ class Dataset:
         """The rows of one shard, or some columns of them.
 
         Raises:
-            UserError: missing, truncated, of another recipe or of another schema version.
+            UserError: missing, unreadable, truncated, of another recipe or of another schema version.
         """
         try:
             table = pq.read_table(path, columns=columns)
         except FileNotFoundError:
-            raise UserError(f"{path} is missing; run the {stage_of(path)} stage first") from None
+            raise missing(path) from None
+        except PermissionError:
+            raise unreadable(path) from None
         except (pa.ArrowInvalid, OSError):
-            raise UserError(f"{path} is damaged; delete it and run the {stage_of(path)} stage again") from None
+            raise damaged(path) from None
         problem = self._footer_problem(table.schema.metadata or {})
         if problem:
             raise UserError(f"{path} {problem}; delete it and run the {stage_of(path)} stage again")
@@ -94,30 +101,32 @@ class Dataset:
 
     def shards(self, table: str) -> list[Path]:
         """Finished shards of a table, in order."""
-        return sorted((self.root / table).glob("*.parquet"))
+        return sorted(path for path in (self.root / table).glob("*.parquet") if SHARD_NAME.fullmatch(path.name))
 
     def read(self, table: str, columns: list[str] | None = None) -> pa.Table:
         """All rows of a table in order.
 
         Raises:
-            UserError: there are none, or a shard is damaged.
+            UserError: there are none, one is missing beside others, or one is damaged.
         """
         paths = self.shards(table)
         if not paths:
             raise UserError(f"{self.root} has no {table} yet; run the {stage_of(self.root / table / 'x')} stage first")
+        there = set(paths)
+        told = {match.groups() for match in (SHARD_NAME.fullmatch(path.name) for path in paths) if match}
+        for variant, count in sorted(told):
+            for path in (self.shard_path(table, index, int(count), variant) for index in range(int(count))):
+                if path not in there:
+                    raise missing(path)
         return pa.concat_tables(self.read_shard(path, columns) for path in paths).replace_schema_metadata(None)
 
     def write_manifest(self) -> None:
-        """Manifest and dataset card, both derived from the shards and rebuilt at every stage's end."""
-        entries = [
-            {
-                "path": str(path.relative_to(self.root)),
-                "rows": pq.read_metadata(path).num_rows,
-                "content": (pq.read_metadata(path).metadata or {}).get(DIGEST_KEY, b"").decode(),
-            }
-            for table in TABLES
-            for path in self.shards(table)
-        ]
+        """Manifest and dataset card, both derived from the shards and rebuilt at every stage's end.
+
+        Raises:
+            UserError: a shard is damaged, or the disk or its permissions refuse.
+        """
+        entries = [self._manifest_entry(path) for table in TABLES for path in self.shards(table)]
         manifest = {"recipe": self.recipe.digest(), "schema_version": SCHEMA_VERSION, "shards": entries}
         self._write_text(MANIFEST_FILE, json.dumps(manifest, indent=1) + "\n")
         frames = sum(entry["rows"] for entry in entries if entry["path"].startswith("frames/"))
@@ -127,6 +136,14 @@ class Dataset:
             "object points into the camera frame. Failed rows keep their place with a status and NaN."
         )
         self._write_text(CARD_FILE, f"{title}{conventions}\n\n## Tables\n\n{dictionary()}")
+
+    def _manifest_entry(self, path: Path) -> dict[str, Any]:
+        try:
+            footer = pq.read_metadata(path)
+        except (pa.ArrowInvalid, OSError):
+            raise damaged(path) from None
+        content = (footer.metadata or {}).get(DIGEST_KEY, b"").decode()
+        return {"path": str(path.relative_to(self.root)), "rows": footer.num_rows, "content": content}
 
     def _write_text(self, name: str, text: str) -> None:
         try:
@@ -162,7 +179,7 @@ def claim(root: Path, recipe: Recipe, text: str) -> Dataset:
     path = root / RECIPE_FILE
     dataset = Dataset(root, recipe)
     if path.exists():
-        if parse_recipe(path.read_text(encoding="utf-8"), str(path)).digest() != recipe.digest():
+        if load_recipe(str(path))[0].digest() != recipe.digest():
             raise UserError(f"{root} holds a dataset of another recipe; choose another --out or delete it")
         dataset.sweep()
         return dataset
@@ -172,6 +189,21 @@ def claim(root: Path, recipe: Recipe, text: str) -> Dataset:
         raise UserError(f"{root} is not empty and holds no dataset; choose a new or empty folder for --out")
     dataset._write_text(RECIPE_FILE, text)
     return dataset
+
+
+def missing(path: Path) -> UserError:
+    """A shard that is not there, as a sentence."""
+    return UserError(f"{path} is missing; run the {stage_of(path)} stage first")
+
+
+def damaged(path: Path) -> UserError:
+    """A shard that cannot be decoded, as a sentence."""
+    return UserError(f"{path} is damaged; delete it and run the {stage_of(path)} stage again")
+
+
+def unreadable(path: Path) -> UserError:
+    """A shard that this user may not read, as a sentence: it may be sound, so it is not to be deleted."""
+    return UserError(f"cannot read {path}: this user has no permission; ask its owner for it")
 
 
 def refused(path: Path, error: OSError) -> UserError:

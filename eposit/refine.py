@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from eposit.arrays import Array, Mask
 from eposit.camera import Camera
-from eposit.pose import rotation_from_vector
 
 STEP_TOL = 1e-11  # rad and relative translation; the floor of double precision is about 1e-13
 COST_FLOOR = 1e-12  # relative growth of the cost that counts as rounding, not as a worse step
@@ -78,7 +77,7 @@ def refine_poses(
         ua, va, Ra, ta = u[:, active], v[:, active], state.R[active], state.t[active]
         normal, gradient = normal_equations(camera, points_in_obj, ua, va, Ra, ta, weights)
         step = _damped_step(normal, gradient, damping[active])
-        R_new, t_new = rotation_from_vector(step[:, :3]) @ Ra, ta + step[:, 3:]
+        R_new, t_new = _turn(step[:, :3], Ra), ta + step[:, 3:]
         cost_new = _cost(residuals(camera, points_in_obj, ua, va, R_new, t_new, weights))
         size = np.maximum(
             np.linalg.norm(step[:, :3], axis=1), np.linalg.norm(step[:, 3:], axis=1) / np.linalg.norm(ta, axis=1)
@@ -105,14 +104,14 @@ def normal_equations(
     arm = np.stack((x, y, z)) - t.T[:, None, :]  # lever arm of the rotation
     jacobian = np.empty((6, *residual.shape))
     for row in range(2):
-        jacobian[:3, row] = np.cross(arm, slope[row], axis=0)
+        jacobian[:3, row] = _cross(arm, slope[row])
         jacobian[3:, row] = slope[row]
     b = residual.shape[-1]
     normal, gradient = np.empty((b, 6, 6)), np.empty((b, 6))
     for i in range(6):
-        gradient[:, i] = np.sum(jacobian[i] * residual, axis=(0, 1))
+        gradient[:, i] = _sum(jacobian[i] * residual)
         for j in range(i, 6):
-            normal[:, i, j] = normal[:, j, i] = np.sum(jacobian[i] * jacobian[j], axis=(0, 1))
+            normal[:, i, j] = normal[:, j, i] = _sum(jacobian[i] * jacobian[j])
     return normal, gradient
 
 
@@ -140,6 +139,30 @@ def _damped_step(normal: Array, gradient: Array, damping: Array) -> Array:
     return step
 
 
+def _sum(values: Array) -> Array:
+    """Sum of (2, n, b) over all but b, in one order for any b: NumPy adds a single column pairwise."""
+    flat = values.reshape(-1, values.shape[-1])
+    return np.cumsum(flat, axis=0)[-1] if flat.shape[1] == 1 else np.add.reduce(flat, axis=0)
+
+
+def _cross(a: Array, b: Array) -> Array:
+    return np.stack((a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]))
+
+
+def _turn(vector: Array, R: Array) -> Array:
+    """exp(vector) R for (b, 3) and (b, 3, 3), by Rodrigues' formula."""
+    x, y, z = vector.T
+    angle2 = x * x + y * y + z * z
+    angle = np.sqrt(angle2)
+    sine = np.sinc(angle / np.pi)  # sin(angle) / angle
+    half = np.sinc(0.5 * angle / np.pi)
+    bend = 0.5 * half * half  # (1 - cos(angle)) / angle^2
+    zero = np.zeros_like(x)
+    skew = np.stack((zero, -z, y, z, zero, -x, -y, x, zero), axis=-1).reshape(-1, 3, 3)
+    turn = np.eye(3) + sine[:, None, None] * skew + bend[:, None, None] * (skew @ skew)
+    return turn @ R
+
+
 def _in_camera(points_in_obj: Array, R: Array, t: Array) -> tuple[Array, Array, Array]:
     """Camera coordinates, three (n, b) arrays, by fixed-order sums."""
     px, py, pz = points_in_obj.T[:, :, None]
@@ -156,7 +179,7 @@ def _weigh(weights: Array, pair: Array) -> Array:
 
 def _cost(residual: Array) -> Array:
     with np.errstate(invalid="ignore", over="ignore"):
-        total = np.sum(residual**2, axis=(0, 1))
+        total = _sum(residual**2)
     return np.where(np.isfinite(total), total, np.inf)
 
 

@@ -129,30 +129,32 @@ def _solve_best(problem: _Problem, refined: bool) -> Solution:
     found = starts(problem.points_in_obj, bearings)
     if not found:
         return _coplanar(problem, status)
-    best = _lowest([_candidate(problem, start, refined) for start in found])
+    candidates = _candidates(problem, found, refined)
+    best = _lowest(candidates, len(found))
     _mark(status, ~(best.converged & np.isfinite(best.cost)), Status.NOT_CONVERGED)
     return _finish(problem, Start(best.R, best.t, best.steps, best.converged), status)
 
 
-def _candidate(problem: _Problem, start: Start, refined: bool) -> Refined:
-    u, v = problem.uv
+def _candidates(problem: _Problem, found: list[Start], refined: bool) -> Refined:
+    """All starts of all problems as one batch, start by start, refined or as they are."""
+    u, v = (np.tile(pixels, (1, len(found))) for pixels in problem.uv)
+    R, t = np.concatenate([start.R for start in found]), np.concatenate([start.t for start in found])
+    begun = np.concatenate([start.iterations for start in found])
+    converged = np.concatenate([start.converged for start in found])
     if refined:
-        result = refine_poses(problem.camera, problem.points_in_obj, u, v, start.R, start.t, problem.weights)
-        return Refined(result.R, result.t, result.cost, result.steps + start.iterations, result.converged)
-    weighted = residuals(problem.camera, problem.points_in_obj, u, v, start.R, start.t, problem.weights)
+        result = refine_poses(problem.camera, problem.points_in_obj, u, v, R, t, problem.weights)
+        return Refined(result.R, result.t, result.cost, result.steps + begun, result.converged)
+    weighted = residuals(problem.camera, problem.points_in_obj, u, v, R, t, problem.weights)
     cost = np.nan_to_num(np.sum(weighted**2, axis=(0, 1)), nan=np.inf)
-    return Refined(start.R, start.t, cost, start.iterations, start.converged)
+    return Refined(R, t, cost, begun, converged)
 
 
-def _lowest(candidates: list[Refined]) -> Refined:
+def _lowest(candidates: Refined, starts_each: int) -> Refined:
     """For each problem the converged candidate of lowest cost; the earlier one where costs are equal."""
-    choice = np.argmin([np.where(found.converged, found.cost, np.inf) for found in candidates], axis=0)
-    rows = np.arange(len(choice))
-
-    def pick(name: str) -> NDArray[np.generic]:
-        return np.stack([getattr(candidate, name) for candidate in candidates])[choice, rows]
-
-    return Refined(*(pick(name) for name in ("R", "t", "cost", "steps", "converged")))  # pyright: ignore
+    cost = np.where(candidates.converged, candidates.cost, np.inf).reshape(starts_each, -1)
+    rows = np.argmin(cost, axis=0) * cost.shape[1] + np.arange(cost.shape[1])
+    R, t, converged = candidates.R[rows], candidates.t[rows], candidates.converged[rows]
+    return Refined(R, t, candidates.cost[rows], candidates.steps[rows], converged)
 
 
 def _rmse(problem: _Problem, R: Array, t: Array) -> Array:

@@ -215,6 +215,9 @@ def guarded(command: Callable[[], Any]) -> int:
         if isinstance(error, UserError | BackendError):
             print(f"error: {error}", file=sys.stderr)
             return USER_ERROR
+        if isinstance(error, PermissionError):
+            print(f"error: cannot use {error.filename}: this user has no permission; ask its owner", file=sys.stderr)
+            return USER_ERROR
         if isinstance(error, BrokenPipeError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return 0

@@ -34,10 +34,13 @@ def llvm_version(library: Path) -> int | None:
     """Major version that an LLVM shared library reports, or None if it cannot be loaded as one."""
     try:
         handle = ctypes.CDLL(str(library))
+    except OSError:
+        return None
+    try:
         major = ctypes.c_uint()
         handle.LLVMGetVersion(ctypes.byref(major), None, None)
         return int(major.value)
-    except (OSError, AttributeError):
+    except AttributeError:  # LLVM tells its version since 16
         return _version_in_name(library)
 
 

@@ -7,6 +7,9 @@ and those need no rays.
 from __future__ import annotations
 
 import functools
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -158,7 +161,7 @@ def _shade_rings(target: Target, light: Light, camera: Camera, cam_from_obj: Pos
 
 def _dense(camera: Camera, cam_from_obj: Pose, line: Array) -> Array | None:
     """(n, 2) px along an edge, at most half a pixel apart; None where the lens does not see all of it."""
-    at = np.linspace(0.0, len(line) - 1.0, max(2, len(line)))
+    at, pixels = np.linspace(0.0, len(line) - 1.0, len(line)), None
     for _ in range(2):
         points = np.stack([np.interp(at, np.arange(len(line)), column) for column in line.T], axis=1)
         pixels = camera.project(cam_from_obj.apply(points))
@@ -221,7 +224,7 @@ def read_master(path: Path, key: str = "") -> Master:
     if not path.is_file():
         raise MasterError(f"{path} is missing; run the generate stage again to render it")
     try:
-        with OpenEXR.File(str(path)) as file:
+        with _silent_library(), OpenEXR.File(str(path)) as file:
             header, channels = file.header(), file.channels()
             if header["key"] != key:
                 raise MasterError(
@@ -234,3 +237,16 @@ def read_master(path: Path, key: str = "") -> Master:
         raise
     except (ValueError, RuntimeError, KeyError, OSError) as error:
         raise MasterError(f"{path} cannot be read as a master; delete it and run the generate stage again") from error
+
+
+@contextmanager
+def _silent_library() -> Iterator[None]:
+    """Nothing reaches file descriptor 2: OpenEXR's library writes there what it raises as well."""
+    kept = os.dup(2)
+    try:
+        with open(os.devnull, "wb") as nowhere:
+            os.dup2(nowhere.fileno(), 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)

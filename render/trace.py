@@ -49,10 +49,8 @@ def _trace_chunk(
     ray, _ = sensor.sample_ray(mi.Float(0.0), mi.Float(0.0), position, mi.Point2f(0.0))
     radiance, hit = _shade(dr, mi, scene, ray)
     # Sums over the contiguous block of a pixel's samples: no atomic additions, the same bits every time.
-    sums = [
-        np.array(dr.block_sum(value, samples)) / np.float32(samples) for value in (radiance, dr.select(hit, 1.0, 0.0))
-    ]
-    return np.stack(sums, axis=1)
+    sums = [np.array(dr.block_sum(value, samples)) for value in (radiance, dr.select(hit, 1.0, 0.0))]
+    return (np.stack(sums, axis=1) / samples).astype(np.float32)
 
 
 def _shade(dr: Any, mi: Any, scene: Any, ray: Any) -> tuple[Any, Any]:

@@ -1,0 +1,90 @@
+"""A tiny dataset that many tests read, and the command line inside this process."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+
+import pytest
+
+from datasets.store import open_dataset
+from pipelines.cli import main
+from pipelines.verify import verify
+
+# Two frames of 400 x 300 px, a shard each; the board fills the middle of the picture.
+TINY = """\
+name = "tiny"
+description = "two small frames"
+seed = 5
+samples = 4
+shard_frames = 1
+four = [[0, 0], [2, 0], [0, 2], "circle"]
+
+[trajectory]
+stop = 90
+step = 90
+
+[[cameras]]
+name = "pinhole"
+lens = "perspective"
+fx = 344.7
+fy = 345.3
+cx = 201.9
+cy = 150.6
+width = 400
+height = 300
+nominal_f = 338
+"""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a command left on the terminal."""
+
+    code: int
+    out: str
+    err: str
+
+
+def command(*words):
+    """Exit code of `python -m pipelines WORDS`, run in this process."""
+    before = sys.argv
+    sys.argv = ["pipelines", *map(str, words)]
+    try:
+        return main()
+    finally:
+        sys.argv = before
+
+
+@pytest.fixture
+def cli(capfd):
+    """Run a command here and return its `Outcome`; what libraries write to the file descriptors counts too."""
+
+    def run(*words):
+        capfd.readouterr()
+        code = command(*words)
+        return Outcome(code, *capfd.readouterr())
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def tiny(tmp_path_factory):
+    """The recipe's text and the folder of its finished dataset, which no test may change."""
+    folder = tmp_path_factory.mktemp("tiny")
+    recipe = folder / "tiny.toml"
+    recipe.write_text(TINY)
+    assert command("run", recipe, "--out", folder / "dataset", "--quiet") == 0
+    return TINY, folder / "dataset"
+
+
+@pytest.fixture(scope="session")
+def content():
+    """Content hash of a sound dataset in a folder."""
+
+    def digest_of(root):
+        digest, problems = verify(open_dataset(root))
+        assert problems == []
+        return digest
+
+    return digest_of
