@@ -24,6 +24,7 @@ from render.target import Target
 
 RIM_POINTS = 72
 SEARCH_STEP_PX = 0.5
+LEAST_STEP = 0.35  # from dark to bright across the contour, as a share of the range of grey values around it
 SEARCH_SHARE = 0.25  # of the local square: how far the centre may lie from where the board predicts it
 OPEN_COSINE = 0.6  # least cosine between an edge's normal and the displacement for the open side
 LEAST_PARALLAX_PX = 0.3  # below which the shade under the circle is hidden on all sides
@@ -34,6 +35,10 @@ LEAST_PIXELS = 24
 LINES_PER_PX = 3  # integration lines of the blurred ellipse
 TOLERANCES = (0.2, 0.1, 0.05, 0.025, 0.015, 0.015)  # scale of the robust weights, as a share of black to white
 STEPS_EACH = 2
+NEAREST_SHARE = (
+    0.4  # of the board's side: nearer, a camera would not see all of it; bounds how much larger the circle is
+)
+SIZE_SLACK = 0.005  # the board's map gives the size to this
 START_BLUR_PX = 0.8
 RESIDUAL_LIMIT = 0.06  # RMS of the fit as a share of the step from black to white
 
@@ -74,11 +79,14 @@ def find_circle(image: NDArray[np.uint8], board: BoardMap, target: Target) -> Ci
         # circle on the board at the place behind it, hardly larger.
         return _ellipse(_rim(board, board.invert(point, at), radius), away)
 
-    return _fit(patch, ellipse_at, centre)
+    x0, x1, y0, y1 = target.extent_mm
+    nearest = NEAREST_SHARE * max(x1 - x0, y1 - y0)
+    sizes = (1.0 - SIZE_SLACK, nearest / (nearest - target.circle_height_mm) + SIZE_SLACK)
+    return _fit(patch, ellipse_at, centre, sizes)
 
 
 def _locate(image: NDArray[np.uint8], board: BoardMap, target: Target) -> tuple[_Patch, Array, Array] | None:
-    """Pixels around the circle, its rough centre, its displacement by its height; None at the image's border."""
+    """Pixels around the circle, its rough centre, its displacement by its height; None if it is not there."""
     at = target.circle_centre[:2] / target.square_mm
     foot, jacobian = board(at)[0], board.jacobian(at)
     parallax = board.parallax(at, target.circle_height_mm / target.square_mm)
@@ -88,7 +96,9 @@ def _locate(image: NDArray[np.uint8], board: BoardMap, target: Target) -> tuple[
     if patch is None:
         return None
     candidates = [_search(patch, rim, foot, sign * parallax, reach) for sign in (1.0, -1.0)]
-    centre, _, away = max(candidates, key=lambda candidate: candidate[1])
+    centre, step, away = max(candidates, key=lambda candidate: candidate[1])
+    if step < LEAST_STEP * float(np.ptp(patch.grey)):
+        return None
     return patch, centre, away
 
 
@@ -190,7 +200,9 @@ def _taking_part(patch: _Patch, ellipse: _Ellipse, centre: Array) -> Mask:
     return (radius < INTERIOR) | ((distance < BAND_PX) & open_side & (patch.white | (distance < -SQUARE_MARGIN_PX)))
 
 
-def _fit(patch: _Patch, ellipse_at: Callable[[Array], _Ellipse], centre: Array) -> Circle | None:
+def _fit(
+    patch: _Patch, ellipse_at: Callable[[Array], _Ellipse], centre: Array, sizes: tuple[float, float]
+) -> Circle | None:
     """Least squares of grey = dark + (bright, sloping) x (1 - blurred ellipse) over centre, size and blur."""
     shape = np.array([*centre, 1.0, START_BLUR_PX])
     trust, residual, contrast = np.zeros(0), np.zeros(0), 0.0
@@ -213,7 +225,7 @@ def _fit(patch: _Patch, ellipse_at: Callable[[Array], _Ellipse], centre: Array) 
             normal += 1e-3 * np.diag(np.diag(normal)) + 1e-9 * np.eye(4)
             step = -np.linalg.solve(normal, jacobian.T @ (residual * trust))
             shape = shape + np.clip(step, [-0.5, -0.5, -0.05, -0.2], [0.5, 0.5, 0.05, 0.2])
-            shape[2:] = np.clip(shape[2:], [0.8, 0.2], [1.25, 6.0])
+            shape[2:] = np.clip(shape[2:], [*sizes[:1], 0.2], [*sizes[1:], 6.0])
             weights = 1.0 / (1.0 + (residual / (tolerance * contrast)) ** 2) ** 2
     misfit = float(np.sqrt(np.sum(trust * residual**2) / np.sum(trust)) / max(contrast, 1.0))
     if misfit > RESIDUAL_LIMIT or np.sum(trust) < LEAST_PIXELS or not np.all(np.isfinite(shape)):

@@ -8,7 +8,7 @@ import numpy as np
 
 from eposit.arrays import Array, Mask
 
-DEGREE = 4  # leaves 0.01 px on a fish-eye board 500 px wide
+DEGREE = 5  # leaves 0.02 px on a fish-eye board 500 px wide, and 0.4 px where it fills the picture
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,5 +72,6 @@ def leave_one_out(corners_px: Array, inner: tuple[int, int], use: Mask) -> Array
 def _basis(inner: tuple[int, int], at: Array) -> Array:
     """(m, terms) monomials at board coordinates scaled to [-1, 1]."""
     x, y = (at / np.array([inner[0] - 1, inner[1] - 1]) * 2.0 - 1.0).T
-    degree = min(DEGREE, inner[0] - 2, inner[1] - 2)
-    return np.stack([x**i * y**j for i in range(degree + 1) for j in range(degree + 1 - i)], axis=1)
+    most_x, most_y = min(DEGREE, inner[0] - 2), min(DEGREE, inner[1] - 2)
+    powers = [(i, j) for i in range(most_x + 1) for j in range(most_y + 1) if i + j <= DEGREE]
+    return np.stack([x**i * y**j for i, j in powers], axis=1)

@@ -60,7 +60,7 @@ def register_sensor(mi: Any) -> None:
     class Fisheye(mi.Sensor):
         def __init__(self, props: Any) -> None:
             super().__init__(props)
-            coefficients = tuple(props[f"k{i}"] for i in range(1, 5) if props.has_property(f"k{i}"))
+            coefficients = tuple(props[f"k{i}"] for i in range(1, 5) if f"k{i}" in props)
             fx, fy, cx, cy = (props[name] for name in ("fx", "fy", "cx", "cy"))
             law = get_lens(props["lens"], coefficients)
             to_world = np.array(props["to_world"].matrix, dtype=np.float64)

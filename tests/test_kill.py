@@ -67,14 +67,17 @@ def before(stage, source, root):
             shutil.rmtree(path) if path.is_dir() else path.unlink()
 
 
+def shards(root, stage):
+    return list((root / TABLE[stage]).glob("[!.]*"))
+
+
 def has_begun(stage, process, root):
-    """Wait until a stage has put its first file down; the report, which has one only, when scoring says it is done."""
+    """Wait until a stage has finished its first shard; for the report, which has none, until scoring is done."""
     if stage == "report":
         assert any(line.startswith("score: all ") for line in process.stdout)
         return
-    folder = root / ("masters" if stage == "generate" else TABLE[stage])
     end = time.monotonic() + PATIENCE_S
-    while not (folder.is_dir() and any(folder.iterdir())):
+    while not shards(root, stage):
         assert process.poll() is None
         assert time.monotonic() < end
         time.sleep(0.001)
@@ -83,7 +86,7 @@ def has_begun(stage, process, root):
 def has_ended(stage, source, root):
     if stage == "report":
         return (root / "report.html").exists()
-    return len(list((root / TABLE[stage]).glob("[!.]*"))) == len(list((source / TABLE[stage]).iterdir()))
+    return len(shards(root, stage)) == len(shards(source, stage))
 
 
 def killed_in(stage, finished, folder):

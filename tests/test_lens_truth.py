@@ -51,7 +51,8 @@ def project(camera, points, scale=1.0, shift=0.0):
 
 def dots(camera):
     """Rings x directions of discs that face the camera: centre, two axes as long as the radius."""
-    rings = np.deg2rad(np.linspace(12.0, 70.0 if camera.lens == "perspective" else 80.0, 6))
+    # The inner ring is wide enough that its dots do not touch.
+    rings = np.deg2rad(np.linspace(*((30.0, 70.0) if camera.lens == "perspective" else (12.0, 80.0)), 6))
     found = []
     for i, theta in enumerate(rings):
         step = 1e-5

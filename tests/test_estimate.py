@@ -1,0 +1,92 @@
+"""Estimates and scores: which camera is assumed, whose noise is shared, what counts as a failure."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import eposit
+from datasets.errors import UserError
+from datasets.recipe import load_recipe
+from datasets.store import Dataset
+from pipelines.estimate import Setting, _noise, solve_with
+from pipelines.rows import points_by_frame, pose_columns, poses
+from tests.cameras import PAPER_OBJECT, helix_pose, paper_camera
+
+
+def frame_row(lens="orthogonal", pose_id=0):
+    camera = paper_camera(lens)
+    row = {f"{name}_px": getattr(camera, name) for name in ("fx", "fy", "cx", "cy", "width", "height")}
+    return row | {"lens": lens, "nominal_f_px": 541.0, "pose_id": pose_id} | {f"k{i}": 0.0 for i in range(1, 5)}
+
+
+def mean_errors(camera_setting, solver="eposit"):
+    """Mean translation error on the paper's helix without noise, mm."""
+    errors = []
+    for t in range(0, 361, 20):
+        pose = helix_pose(t)
+        pixels = paper_camera("orthogonal").project(pose.apply(PAPER_OBJECT))
+        found = solve_with(Setting(solver=solver, camera=camera_setting), PAPER_OBJECT, pixels[None], frame_row())
+        errors.append(found.cam_from_obj.t[0] - pose.t)
+    return np.mean(errors, axis=0)
+
+
+def test_the_three_cameras():
+    # Exact: nothing is left but the iteration's last step.
+    assert np.abs(mean_errors("exact")).max() < 1e-8
+    # Paper: f 541 against 552.5 makes z too small by 2.1 %, 42.5 mm at the mean depth of 2045 mm; theta measured from
+    # the image centre, 22 px off the principal point, adds 3.5 mm.
+    assert mean_errors("paper", "posit")[2] == pytest.approx(-42.5, abs=0.7)
+    paper = mean_errors("paper")
+    assert paper[2] == pytest.approx(-46.0, abs=0.7)
+    assert np.abs(paper[:2]).max() < 2.0
+    # Nominal: the image centre is 17.6 and 13.7 px off the principal point, at 2 m and 541 px that is 65 and 51 mm.
+    nominal = mean_errors("nominal")
+    assert nominal[0] == pytest.approx(-65.0, abs=5.0)
+    assert nominal[1] == pytest.approx(51.0, abs=5.0)
+
+
+def test_noise_is_keyed_by_pose_and_draw_and_shared_by_lenses(tmp_path):
+    dataset, setting = Dataset(tmp_path, load_recipe("smoke")[0]), Setting(points="truth+noise")
+    first = _noise(dataset, frame_row("orthogonal", 3), 0, setting)
+    np.testing.assert_array_equal(first, _noise(dataset, frame_row("perspective", 3), 0, setting))
+    assert np.any(first != _noise(dataset, frame_row("orthogonal", 4), 0, setting))
+    assert np.any(first != _noise(dataset, frame_row("orthogonal", 3), 1, setting))
+    many = np.concatenate([_noise(dataset, frame_row(pose_id=i), 0, setting) for i in range(60)])
+    # 6600 draws: the standard deviation is good to 0.4 / sqrt(2 x 6600) = 0.0035; four of those.
+    assert many.std() == pytest.approx(0.4, abs=0.014)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"solver": "x"}, {"points": "x"}, {"camera": "x"}, {"use": "x"}, {"noise_px": -1.0}, {"draws": 0}],
+)
+def test_wrong_settings_are_sentences(wrong):
+    with pytest.raises(UserError, match=r"(unknown|not usable)"):
+        dataclasses.replace(Setting(), **wrong)
+
+
+def test_poses_survive_their_columns():
+    pose = helix_pose(10.0)
+    R, t = np.stack((pose.R, np.full((3, 3), np.nan))), np.stack((pose.t, np.full(3, np.nan)))
+    import pyarrow as pa
+
+    back = poses(pa.table(pose_columns(R, t)))
+    np.testing.assert_allclose(back.R[0], pose.R, atol=1e-15)
+    assert np.isnan(back.R[1]).all()
+    assert np.isnan(back.t[1]).all()
+
+
+def test_points_by_frame_keeps_order():
+    import pyarrow as pa
+
+    target = load_recipe("smoke")[0].target
+    n = len(target.points)
+    rows = pa.table({"frame_id": np.repeat([4, 5], n), "x_px": np.arange(2.0 * n), "y_px": -np.arange(2.0 * n)})
+    found = points_by_frame(rows, target)
+    assert list(found) == [4, 5]
+    np.testing.assert_array_equal(found[5][0], [n, -n])
+
+
+def test_methods_are_the_documented_ones():
+    assert eposit.METHODS == ("best", "centred", "eposit", "posit")
