@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -36,7 +37,8 @@ def rng_for(seed: int, stream: Stream, *key: int) -> np.random.Generator:
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(int(stream), *key)))
 
 
-def plan(recipe: Recipe) -> list[Frame]:
+@functools.lru_cache(maxsize=4)
+def plan(recipe: Recipe) -> tuple[Frame, ...]:
     """All frames, poses outermost: frame_id = pose_id * cameras + camera.
 
     Raises:
@@ -51,12 +53,17 @@ def plan(recipe: Recipe) -> list[Frame]:
             frames.append(Frame(frame_id, pose_id, float(time_s), camera, pose, seed))
     for frame in frames:
         _check(frame, recipe)
-    return frames
+    return tuple(frames)
 
 
-def shard_count(recipe: Recipe, frames: list[Frame]) -> int:
+def frame_count(recipe: Recipe) -> int:
+    """Number of frames, without making the plan."""
+    return len(recipe.trajectory.times()) * len(recipe.cameras)
+
+
+def shard_count(recipe: Recipe) -> int:
     """Number of shards; the boundaries come from the recipe alone."""
-    return -(-len(frames) // recipe.shard_frames)
+    return -(-frame_count(recipe) // recipe.shard_frames)
 
 
 def _check(frame: Frame, recipe: Recipe) -> None:

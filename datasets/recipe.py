@@ -112,6 +112,9 @@ class Recipe(BaseModel):
         four = ((0, 0), (across - 1, 0), (0, down - 1), CIRCLE) if self.four is None else self.four
         return [self.target.index(point) for point in four]
 
+    def __hash__(self) -> int:
+        return hash(self.digest())
+
     def digest(self) -> str:
         """Hash of everything that decides the content; name and description do not."""
         content = self.model_dump(mode="json", exclude={"name", "description"})

@@ -42,6 +42,11 @@ class Dataset:
         """Path of a shard; `variant` tells kinds of estimates apart."""
         return self.root / table / f"{variant or table}-{index:05d}-of-{count:05d}.parquet"
 
+    def sibling(self, path: Path, table: str) -> Path:
+        """The shard of another table over the same frames."""
+        _, index, _, count = path.stem.rsplit("-", 3)
+        return self.shard_path(table, int(index), int(count))
+
     def is_done(self, path: Path) -> bool:
         """Whether a valid shard of this recipe is there."""
         if not path.is_file():

@@ -155,7 +155,7 @@ def bench(
 @app.command(epilog="Example: python -m pipelines recipes")
 def recipes() -> None:
     """List the recipes that come with the package."""
-    from datasets.plan import plan
+    from datasets.plan import frame_count
     from datasets.recipe import load_recipe, recipe_names
 
     table = Table(box=None)
@@ -163,7 +163,7 @@ def recipes() -> None:
         table.add_column(title)
     for name in recipe_names():
         recipe, _ = load_recipe(name)
-        table.add_row(name, str(len(plan(recipe))), recipe.description)
+        table.add_row(name, str(frame_count(recipe)), recipe.description)
     Console().print(table)
 
 

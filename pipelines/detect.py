@@ -6,9 +6,9 @@ import numpy as np
 import pyarrow as pa
 
 from datasets.errors import UserError
+from datasets.plan import shard_count
 from datasets.schema import DETECTIONS
 from datasets.store import Dataset
-from pipelines import generate
 from pipelines.detection import detect_points
 from pipelines.rows import table
 from render.develop import decode_png
@@ -16,12 +16,12 @@ from render.develop import decode_png
 
 def is_done(dataset: Dataset, index: int) -> bool:
     """Whether a shard is there."""
-    return dataset.is_done(dataset.shard_path("detections", index, generate.shards(dataset.recipe)))
+    return dataset.is_done(dataset.shard_path("detections", index, shard_count(dataset.recipe)))
 
 
 def run_shard(dataset: Dataset, index: int) -> None:
     """Make one shard of `detections` from the same shard of `frames`."""
-    count = generate.shards(dataset.recipe)
+    count = shard_count(dataset.recipe)
     path = dataset.shard_path("frames", index, count)
     frames = dataset.read_shard(path)
     parts: list[pa.Table] = []

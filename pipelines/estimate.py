@@ -11,12 +11,11 @@ import pyarrow as pa
 
 import eposit
 from datasets.errors import UserError
-from datasets.plan import Stream, rng_for
+from datasets.plan import Stream, rng_for, shard_count
 from datasets.schema import ESTIMATES, FRAMES
 from datasets.store import Dataset
 from eposit import Camera, Solution
 from eposit.arrays import Array
-from pipelines import generate
 from pipelines.rows import camera_of, points_by_frame, pose_columns, table
 
 POINTS = ("detected", "truth", "truth+noise")
@@ -67,7 +66,7 @@ def is_done(dataset: Dataset, index: int, setting: Setting) -> bool:
 
 def run_shard(dataset: Dataset, index: int, setting: Setting) -> None:
     """Make one shard of `estimates`."""
-    count = generate.shards(dataset.recipe)
+    count = shard_count(dataset.recipe)
     columns = [name for name in FRAMES.names if name != "image"]
     frames = dataset.read_shard(dataset.shard_path("frames", index, count), columns).to_pylist()
     source = "detections" if setting.points == "detected" else "keypoints"
@@ -77,7 +76,7 @@ def run_shard(dataset: Dataset, index: int, setting: Setting) -> None:
 
 
 def _path(dataset: Dataset, index: int, setting: Setting) -> Path:
-    return dataset.shard_path("estimates", index, generate.shards(dataset.recipe), setting.name)
+    return dataset.shard_path("estimates", index, shard_count(dataset.recipe), setting.name)
 
 
 def _estimate(dataset: Dataset, frame: dict[str, Any], points_px: Array, setting: Setting) -> pa.Table:

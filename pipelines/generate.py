@@ -22,23 +22,17 @@ from render.develop import develop, encode_png
 from render.master import Master, MasterError, read_master, render_master, write_master
 
 
-def shards(recipe: Recipe) -> int:
-    """Number of shards of this stage."""
-    return shard_count(recipe, plan(recipe))
-
-
 def is_done(dataset: Dataset, index: int) -> bool:
     """Whether both tables of a shard are there."""
-    count = shards(dataset.recipe)
+    count = shard_count(dataset.recipe)
     return all(dataset.is_done(dataset.shard_path(name, index, count)) for name in ("frames", "keypoints"))
 
 
 def run_shard(dataset: Dataset, index: int) -> None:
     """Make one shard of `frames` and `keypoints` and its masters."""
     recipe = dataset.recipe
-    frames = plan(recipe)
-    count = shard_count(recipe, frames)
-    chosen = frames[index * recipe.shard_frames : (index + 1) * recipe.shard_frames]
+    count = shard_count(recipe)
+    chosen = plan(recipe)[index * recipe.shard_frames : (index + 1) * recipe.shard_frames]
     rows = [_frame_row(dataset, frame) for frame in chosen]
     truth = pa.concat_tables(_keypoints(recipe, frame) for frame in chosen)
     dataset.write_shard(dataset.shard_path("keypoints", index, count), truth)

@@ -28,7 +28,8 @@ def is_done(dataset: Dataset, estimates: Path) -> bool:
 def run_shard(dataset: Dataset, estimates: Path) -> None:
     """Make one shard of `scores`."""
     rows = dataset.read_shard(estimates)
-    truth = dataset.read("frames", ["frame_id", *(f"q_{a}" for a in "wxyz"), *(f"t_{a}_mm" for a in "xyz")])
+    frames = dataset.sibling(estimates, "frames")
+    truth = dataset.read_shard(frames, ["frame_id", *(f"q_{a}" for a in "wxyz"), *(f"t_{a}_mm" for a in "xyz")])
     place = {frame: i for i, frame in enumerate(truth["frame_id"].to_pylist())}
     true = poses(truth.take([place[frame] for frame in rows["frame_id"].to_pylist()]))
     found = poses(rows)

@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
+from datasets.plan import shard_count
 from datasets.store import Dataset
 from pipelines import detect, estimate, generate, score
 from pipelines.engine import map_shards
@@ -36,13 +37,13 @@ class _Rate(ProgressColumn):
 
 def run_generate(dataset: Dataset, workers: int, console: Console) -> None:
     """Render what is missing."""
-    indices = range(generate.shards(dataset.recipe))
+    indices = range(shard_count(dataset.recipe))
     _run("generate", dataset, indices, generate.is_done, generate.run_shard, workers, console)
 
 
 def run_detect(dataset: Dataset, workers: int, console: Console) -> None:
     """Detect what is missing."""
-    indices = range(generate.shards(dataset.recipe))
+    indices = range(shard_count(dataset.recipe))
     _run("detect", dataset, indices, detect.is_done, detect.run_shard, workers, console)
 
 
@@ -52,7 +53,7 @@ def run_estimate(dataset: Dataset, settings: Iterable[Setting], workers: int, co
         _run(
             f"estimate {setting.name}",
             dataset,
-            range(generate.shards(dataset.recipe)),
+            range(shard_count(dataset.recipe)),
             functools.partial(estimate.is_done, setting=setting),
             functools.partial(estimate.run_shard, setting=setting),
             workers,

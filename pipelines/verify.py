@@ -9,6 +9,7 @@ import pyarrow.parquet as pq
 
 from datasets.errors import UserError
 from datasets.identity import table_digest
+from datasets.plan import shard_count
 from datasets.schema import TABLES
 from datasets.store import DIGEST_KEY, Dataset
 from pipelines import generate
@@ -42,7 +43,7 @@ def _shard_problem(dataset: Dataset, path: Path) -> str | None:
 
 
 def _missing(dataset: Dataset) -> list[str]:
-    count = generate.shards(dataset.recipe)
+    count = shard_count(dataset.recipe)
     return [
         f"{path} is missing; run the generate stage to make it"
         for table in ("frames", "keypoints")
