@@ -22,7 +22,7 @@ demo: $(SETUP)  ## 40 rendered frames, poses and out/demo/report.html
 	$(BIN)/python -m pipelines demo --out out/demo
 
 test: $(SETUP)  ## the tests that need pip only, under 10 minutes on 2 cores
-	$(BIN)/python -m pytest -m "not full and not slow"
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not full and not slow"
 
 test-full: $(SETUP)  ## adds other environments: the built wheel alone
 	$(BIN)/python -m pytest -m full

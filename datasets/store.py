@@ -145,6 +145,8 @@ class Dataset:
     def _manifest_entry(self, path: Path) -> dict[str, Any]:
         try:
             footer = pq.read_metadata(path)
+        except PermissionError:
+            raise unreadable(path) from None
         except (pa.ArrowInvalid, OSError):
             raise damaged(path) from None
         content = (footer.metadata or {}).get(DIGEST_KEY, b"").decode()

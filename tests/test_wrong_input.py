@@ -443,7 +443,7 @@ def public(place):
 
 
 def lock(folder, mode):
-    """Take rights from a folder and all folders in it."""
+    """Set the rights on a folder and all folders in it."""
     for path in (*(path for path in folder.rglob("*") if path.is_dir()), folder):
         path.chmod(mode)
 
@@ -480,14 +480,20 @@ def test_a_folder_that_is_closed_to_the_user(words, public, cli):
     assert_one_sentence(outcome.code, outcome.err, "this user has no permission")
 
 
-def test_an_unreadable_shard_is_not_called_damaged(public, cli):
-    root = public.dataset(["scores"])
-    path = first(root, "estimates")
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [("estimates", ("score",)), ("estimates", ("estimate",)), ("scores", ("estimate", "--solver", "posit"))],
+)
+def test_an_unreadable_shard_is_not_called_damaged(table, words, public, cli):
+    root = public.dataset(["scores"] if words == ("score",) else [])
+    lock(root, 0o777)
+    path = first(root, table)
     path.chmod(0o000)
     with another_user():
-        outcome = cli("score", root)
+        outcome = cli(words[0], root, *words[1:])
     assert_one_sentence(outcome.code, outcome.err, f"cannot read {path}")
     assert "delete" not in outcome.err
+    assert path.exists()
 
 
 @pytest.mark.parametrize(
