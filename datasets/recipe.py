@@ -25,6 +25,7 @@ from render.target import CIRCLE, Target
 RECIPES = resources.files("datasets") / "recipes"
 SUFFIX = ".toml"
 MAX_PIXELS = 100_000_000
+LEAST_FOCAL_PX, MOST_FOCAL_PX = 1.0, 1e6
 UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")  # Pydantic's types of fault
 
 
@@ -44,6 +45,9 @@ class CameraSpec:
     nominal_f: Annotated[float | None, "nominal focal length, px; the mean of fx and fy if left out"] = None
 
     def __post_init__(self) -> None:
+        if not (LEAST_FOCAL_PX <= self.fx <= MOST_FOCAL_PX and LEAST_FOCAL_PX <= self.fy <= MOST_FOCAL_PX):
+            allowed = f"{LEAST_FOCAL_PX:g} to {MOST_FOCAL_PX:g} px"
+            raise ValueError(f"camera {self.name!r} has fx {self.fx} and fy {self.fy}; both must lie in {allowed}")
         if self.width * self.height > MAX_PIXELS:
             raise ValueError(f"camera {self.name!r} has {self.width} x {self.height} pixels; at most {MAX_PIXELS} work")
         if self.nominal_f is not None and not self.nominal_f > 0.0:
@@ -147,7 +151,7 @@ def load_recipe(name: str) -> tuple[Recipe, str]:
     """
     if name.endswith(SUFFIX) or "/" in name:
         try:
-            text = Path(name).read_text(encoding="utf-8")
+            text = Path(name).read_text(encoding="utf-8-sig")
         except (OSError, UnicodeDecodeError) as error:
             reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
             raise UserError(f"cannot read recipe {name}: {reason}; give a .toml file, or one of {_known()}") from None
@@ -232,9 +236,8 @@ def _sentence(error: ValidationError) -> str:
         return f"key {key!r} is missing; add it"
     if kind == "value_error":
         return str(first.get("ctx", {}).get("error", first["msg"]))
-    return (
-        f"key {key!r} is {_short(given)}: {first['msg'][:1].lower()}{first['msg'][1:]}; see `describe` for its meaning"
-    )
+    meaning = next((text for name, _, text in describe() if name == ".".join(p for p in path if not p.isdigit())), "")
+    return f"key {key!r} is {_short(given)} ({first['msg'][:1].lower()}{first['msg'][1:]}); it takes: {meaning}"
 
 
 def _keys_beside(path: list[str]) -> list[str]:

@@ -5,13 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pyarrow as pa
 
-from datasets.errors import UserError
 from datasets.plan import shard_count
 from datasets.schema import DETECTIONS
 from datasets.store import Dataset
 from pipelines.detection import detect_points
-from pipelines.rows import table
-from render.develop import decode_png
+from pipelines.rows import decode_image, table
 
 
 def is_done(dataset: Dataset, index: int) -> bool:
@@ -26,11 +24,7 @@ def run_shard(dataset: Dataset, index: int) -> None:
     frames = dataset.read_shard(path)
     parts: list[pa.Table] = []
     for frame_id, image in zip(frames["frame_id"].to_pylist(), frames["image"].to_pylist(), strict=True):
-        try:
-            pixels = decode_png(image["bytes"])
-        except ValueError as error:
-            raise UserError(f"{path}, frame {frame_id}: {error}; delete it and run the generate stage again") from None
-        found = detect_points(pixels, dataset.recipe.target)
+        found = detect_points(decode_image(image, path, frame_id), dataset.recipe.target)
         n = len(found.status)
         columns = {
             "frame_id": np.full(n, frame_id),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from typing import TypeVar
 
 from datasets.errors import UserError
@@ -13,15 +14,24 @@ MAX_WORKERS = 256
 Task = TypeVar("Task")
 
 
+def check_workers(workers: int) -> None:
+    """Refuse a number of workers that is not usable.
+
+    Raises:
+        UserError: below 1 or above MAX_WORKERS.
+    """
+    if not 1 <= workers <= MAX_WORKERS:
+        raise UserError(f"{workers} workers are not usable; give --workers from 1 to {MAX_WORKERS}")
+
+
 def map_shards(run_one: Callable[[Task], None], tasks: Sequence[Task], workers: int) -> Iterator[Task]:
     """Run every task, here or in `workers` processes, and yield each when it is done, in any order.
 
     Raises:
-        UserError: a number of workers that is not usable.
+        UserError: a number of workers that is not usable, or a worker that the system killed.
         Exception: what a task raised; tasks not yet begun are cancelled.
     """
-    if not 1 <= workers <= MAX_WORKERS:
-        raise UserError(f"{workers} workers are not usable; give --workers from 1 to {MAX_WORKERS}")
+    check_workers(workers)
     if workers == 1 or len(tasks) < 2:
         for task in tasks:
             run_one(task)
@@ -35,6 +45,10 @@ def map_shards(run_one: Callable[[Task], None], tasks: Sequence[Task], workers: 
             for future in as_completed(futures):
                 future.result()
                 yield futures[future]
+        except BrokenProcessPool:
+            raise UserError(
+                "a worker process was killed, often for lack of memory; run again with fewer --workers"
+            ) from None
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise

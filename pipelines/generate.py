@@ -23,20 +23,25 @@ from render.master import Master, MasterError, read_master, render_master, write
 
 
 def is_done(dataset: Dataset, index: int) -> bool:
-    """Whether both tables of a shard are there."""
+    """Whether both tables of a shard and its masters are there."""
     count = shard_count(dataset.recipe)
-    return all(dataset.is_done(dataset.shard_path(name, index, count)) for name in ("frames", "keypoints"))
+    if not all(dataset.is_done(dataset.shard_path(name, index, count)) for name in ("frames", "keypoints")):
+        return False
+    return all((dataset.root / _master_path(frame)).is_file() for frame in _frames(dataset.recipe, index))
 
 
 def run_shard(dataset: Dataset, index: int) -> None:
     """Make one shard of `frames` and `keypoints` and its masters."""
     recipe = dataset.recipe
-    count = shard_count(recipe)
-    chosen = plan(recipe)[index * recipe.shard_frames : (index + 1) * recipe.shard_frames]
+    count, chosen = shard_count(recipe), _frames(recipe, index)
     rows = [_frame_row(dataset, frame) for frame in chosen]
     truth = pa.concat_tables(_keypoints(recipe, frame) for frame in chosen)
     dataset.write_shard(dataset.shard_path("keypoints", index, count), truth)
     dataset.write_shard(dataset.shard_path("frames", index, count), pa.Table.from_pylist(rows, schema=FRAMES))
+
+
+def _frames(recipe: Recipe, index: int) -> tuple[Frame, ...]:
+    return plan(recipe)[index * recipe.shard_frames : (index + 1) * recipe.shard_frames]
 
 
 def _frame_row(dataset: Dataset, frame: Frame) -> dict[str, object]:

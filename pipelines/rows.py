@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 
+from datasets.errors import UserError
 from eposit import Camera, Pose
 from eposit.arrays import Array
+from render.develop import decode_png
 from render.target import Target
+
+LEAST_SIDE_PX = 16
 
 
 def table(schema: pa.Schema, columns: dict[str, Any]) -> pa.Table:
@@ -48,6 +54,21 @@ def camera_of(row: dict[str, Any]) -> Camera:
         **{name: row[f"{name}_px"] for name in ("fx", "fy", "cx", "cy", "width", "height")},
         coefficients=coefficients,
     )
+
+
+def decode_image(image: dict[str, Any], path: Path, frame_id: int) -> NDArray[np.uint8]:
+    """(height, width) grey values of an image of `frames`.
+
+    Raises:
+        UserError: not a grey PNG, or too small to hold a board; the message names the shard.
+    """
+    try:
+        pixels = decode_png(image["bytes"])
+        if min(pixels.shape) < LEAST_SIDE_PX:
+            raise ValueError(f"the image is {pixels.shape[1]} x {pixels.shape[0]} px")
+    except ValueError as error:
+        raise UserError(f"{path}, frame {frame_id}: {error}; delete it and run the generate stage again") from None
+    return pixels
 
 
 def points_by_frame(rows: pa.Table, target: Target) -> dict[int, Array]:

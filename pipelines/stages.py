@@ -13,7 +13,7 @@ from rich.text import Text
 from datasets.plan import shard_count
 from datasets.store import Dataset
 from pipelines import detect, estimate, generate, score
-from pipelines.engine import map_shards
+from pipelines.engine import check_workers, map_shards
 from pipelines.estimate import Setting
 
 Shard = TypeVar("Shard")
@@ -80,9 +80,11 @@ def _run(
     workers: int,
     console: Console,
 ) -> None:
+    check_workers(workers)
     missing = [shard for shard in shards if not is_done(dataset, shard)]
     if not missing:
         console.print(f"{name}: all {len(shards)} shards are there")
+        dataset.write_manifest()
         return
     columns = (
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("shards"), _Rate(),

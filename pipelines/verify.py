@@ -11,7 +11,7 @@ from datasets.errors import UserError
 from datasets.identity import table_digest
 from datasets.plan import shard_count
 from datasets.schema import TABLES
-from datasets.store import DIGEST_KEY, Dataset
+from datasets.store import DIGEST_KEY, Dataset, stage_of
 from pipelines import generate
 from render.master import MasterError, read_master
 
@@ -36,8 +36,10 @@ def _shard_problem(dataset: Dataset, path: Path) -> str | None:
     try:
         rows = dataset.read_shard(path)
         digest = table_digest(rows)
-    except (UserError, ValueError) as error:
+    except UserError as error:
         return str(error)
+    except ValueError as error:
+        return f"{path}: {error}; delete it and run the {stage_of(path)} stage again"
     stated = (rows.schema.metadata or {}).get(DIGEST_KEY, b"").decode()
     return None if digest == stated else f"{path}: rows do not match the hash in its footer; delete it and run again"
 

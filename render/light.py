@@ -13,7 +13,7 @@ import numpy as np
 from eposit.arrays import Array
 from render.target import Target
 
-GRID_MM = 1.0  # spacing of the irradiance map, mm; the narrowest penumbra of the default lamp is 3 mm wide
+GRID_SHARE = 0.01  # spacing of the map of the light in squares: 1 mm on the paper's board, a third of the penumbra
 LAMP_SAMPLES = 48  # lamp positions along each side for the circle's shadow
 SMOOTH_SAMPLES = 6  # lamp positions along each side where nothing casts a shadow
 
@@ -67,7 +67,8 @@ def shading_map(target: Target, light: Light) -> tuple[Array, float]:
         the circle, which nothing shades. The board's white at its centre, without shadows, has radiance 1.
     """
     x0, x1, y0, y1 = target.extent_mm
-    nx, ny = round((x1 - x0) / GRID_MM), round((y1 - y0) / GRID_MM)
+    spacing = GRID_SHARE * target.square_mm
+    nx, ny = round((x1 - x0) / spacing), round((y1 - y0) / spacing)
     x, y = x0 + (np.arange(nx) + 0.5) * (x1 - x0) / nx, y0 + (np.arange(ny) + 0.5) * (y1 - y0) / ny
     points = np.stack((*np.meshgrid(x, y), np.zeros((ny, nx))), axis=-1)
     lamp = _smooth_lamp(target, light, points)
@@ -88,7 +89,7 @@ def shade_radius(target: Target, light: Light) -> float:
     """Distance from the circle's axis, mm, within which the lamp's shadow of it lies on the board."""
     to_lamp = light.lamp_corners(target) - target.circle_centre
     slope = np.max(np.linalg.norm(to_lamp[:, :2] / to_lamp[:, 2:], axis=1))
-    return float(target.circle_radius_mm + 1.1 * target.circle_height_mm * slope + 2.0 * GRID_MM)
+    return float(target.circle_radius_mm + 1.1 * target.circle_height_mm * slope + 2.0 * GRID_SHARE * target.square_mm)
 
 
 def reference_irradiance(target: Target, light: Light) -> tuple[float, float]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from eposit.arrays import Array
 
 CIRCLE = "circle"
+MAX_SQUARES, MAX_MARGIN = 24, 3.0  # the map of the light has 100 x 100 points in a square
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,8 +39,10 @@ class Target:
     circle: Annotated[float, "reflectance of the circle"] = 0.04
 
     def __post_init__(self) -> None:
-        if self.columns < 4 or self.rows < 4:
-            raise ValueError(f"target has {self.columns} x {self.rows} squares; it needs at least 4 x 4")
+        if not (4 <= self.columns <= MAX_SQUARES and 4 <= self.rows <= MAX_SQUARES):
+            raise ValueError(
+                f"target has {self.columns} x {self.rows} squares; each number must lie in 4 to {MAX_SQUARES}"
+            )
         if (self.columns + self.rows) % 2 == 0:
             raise ValueError(
                 f"target has {self.columns} x {self.rows} squares, which looks the same after half a turn; "
@@ -48,8 +51,8 @@ class Target:
         for name in ("square_mm", "circle_radius_mm", "circle_height_mm"):
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"target {name} is {getattr(self, name)}; it must be above 0 mm")
-        if not self.margin_squares >= 0.5:
-            raise ValueError(f"target margin_squares is {self.margin_squares}; detection needs at least 0.5")
+        if not 0.5 <= self.margin_squares <= MAX_MARGIN:
+            raise ValueError(f"target margin_squares is {self.margin_squares}; it must lie in 0.5 to {MAX_MARGIN}")
         for name in ("white", "black", "circle"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise ValueError(f"target {name} is {getattr(self, name)}; a reflectance lies in 0 to 1")

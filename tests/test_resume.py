@@ -137,3 +137,22 @@ def test_the_content_tells_datasets_apart(tiny, copy, cli, content, tmp_path):
     recipe.write_text(tiny[0])
     assert cli("generate", recipe, "--out", tmp_path / "same").code == 0
     assert content(tmp_path / "other") != content(tmp_path / "same")
+
+
+def test_a_missing_master_is_rendered_again(copy, cli, content):
+    recipe, root = copy
+    before = content(root)
+    lost = first(root, "masters")
+    lost.unlink()
+    assert cli("verify", root).code == 2
+    assert cli("generate", recipe, "--out", root).code == 0
+    assert lost.is_file()
+    assert content(root) == before
+
+
+def test_a_lost_manifest_is_made_again(copy, cli):
+    recipe, root = copy
+    text = (root / "manifest.json").read_text()
+    (root / "manifest.json").unlink()
+    assert cli("generate", recipe, "--out", root).code == 0
+    assert (root / "manifest.json").read_text() == text

@@ -213,7 +213,7 @@ RECIPES = {
     "samples not a square": (recipe("samples = 4", "samples = 5"), "must be a square number"),
     "negative seed": (recipe("seed = 5", "seed = -5"), "key 'seed' is -5"),
     "empty shards": (recipe("shard_frames = 1", "shard_frames = 0"), "key 'shard_frames' is 0"),
-    "negative focal length": (recipe("fx = 344.7", "fx = -344.7"), "camera fx is -344.7"),
+    "negative focal length": (recipe("fx = 344.7", "fx = -344.7"), "has fx -344.7"),
     "negative nominal focal length": (recipe("nominal_f = 338", "nominal_f = -338"), "has nominal_f -338"),
     "zero width": (recipe("width = 400", "width = 0"), "camera width is 0"),
     "negative height": (recipe("height = 300", "height = -300"), "camera height is -300"),

@@ -12,8 +12,7 @@ from datasets.store import RECIPE_FILE, Dataset, refused
 from pipelines.doctor import versions
 from pipelines.report import figures
 from pipelines.report.data import ERRORS, detection_rows, score_rows, series
-from pipelines.rows import points_by_frame
-from render.develop import decode_png
+from pipelines.rows import decode_image, points_by_frame
 from render.files import replace_atomically
 
 REPORT = "report.html"
@@ -77,7 +76,7 @@ def _gallery(dataset: Dataset, frames: list[dict[str, Any]]) -> list[dict[str, A
                 continue
             frame = next(frame for frame in frames if frame["frame_id"] == frame_id)
             region = tuple(frame[f"region_{a}_px"] for a in ("x", "y", "width", "height"))
-            svg = figures.picture(decode_png(image["bytes"]), region, points[frame_id])  # type: ignore[arg-type]
+            svg = figures.picture(decode_image(image, path, frame_id), region, points[frame_id])  # type: ignore[arg-type]
             found = int(np.isfinite(points[frame_id][:, 0]).sum())
             pictures.append({**frame, "svg": svg, "found": found, "total": len(points[frame_id])})
     return pictures
