@@ -27,7 +27,7 @@ test: $(SETUP)  ## the tests that need pip only, under 10 minutes on 2 cores
 test-full: $(SETUP)  ## adds other environments: the built wheel alone
 	$(BIN)/python -m pytest -m full
 
-check-slow: $(SETUP)  ## kills in every stage, large samples; writes docs/evidence
+check-slow: $(SETUP)  ## thirty kills at random moments
 	$(BIN)/python -m pytest -m slow
 
 lint: $(SETUP)  ## ruff
