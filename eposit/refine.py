@@ -141,7 +141,7 @@ def _damped_step(normal: Array, gradient: Array, damping: Array) -> Array:
 
 def _sum(values: Array) -> Array:
     """Sum of (2, n, b) over all but b, in one order for any b: NumPy adds a single column pairwise."""
-    flat = values.reshape(-1, values.shape[-1])
+    flat = values.reshape(values.shape[0] * values.shape[1], values.shape[2])
     return np.cumsum(flat, axis=0)[-1] if flat.shape[1] == 1 else np.add.reduce(flat, axis=0)
 
 

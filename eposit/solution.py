@@ -42,3 +42,15 @@ class Solution:
         pose = Pose(self.cam_from_obj.R[0], self.cam_from_obj.t[0])
         status, rmse = Status(str(self.status[0])), float(self.reprojection_rmse_px[0])
         return Solution(status, pose, int(self.iterations[0]), rmse, self.covariance[0])
+
+
+def join(parts: list[Solution]) -> Solution:
+    """One batch from several."""
+    if len(parts) == 1:
+        return parts[0]
+    pose = Pose(*(np.concatenate([getattr(part.cam_from_obj, name) for part in parts]) for name in ("R", "t")))
+    status, iterations, rmse, spread = (
+        np.concatenate([getattr(part, name) for part in parts])
+        for name in ("status", "iterations", "reprojection_rmse_px", "covariance")
+    )
+    return Solution(status, pose, iterations, rmse, spread)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,10 +13,11 @@ from eposit.camera import Camera
 from eposit.pose import Pose
 from eposit.posit import COPLANAR_CONDITION, Start, condition, posit_checked, rectify_bearings, rectify_paper
 from eposit.refine import Refined, covariance, normal_equations, refine_poses, residuals, whitening
-from eposit.solution import STATUS_TYPE, Solution, Status
+from eposit.solution import STATUS_TYPE, Solution, Status, join
 from eposit.starts import centred_points, rim_bearings, starts, turn_back
 
 METHODS = ("best", "centred", "eposit", "posit")
+CHUNK = 4096  # problems worked on at a time
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,11 +72,20 @@ def solve(
     if theta_centre is not None and method != "eposit":
         raise ValueError(f"theta_centre goes with method 'eposit', not {method!r}; leave it out")
     problem, single = _validate(points_in_obj, points_px, camera, sigma_px)
-    if method == "best":
-        solution = _solve_best(problem, refine)
-    else:
-        solution = _solve_linear(problem, method, tol, max_iterations, theta_centre)
-    return solution.first() if single else solution
+    parts: list[Solution] = []
+    for part in _chunks(problem):
+        if method == "best":
+            parts.append(_solve_best(part, refine))
+        else:
+            parts.append(_solve_linear(part, method, tol, max_iterations, theta_centre))
+    return parts[0].first() if single else join(parts)
+
+
+def _chunks(problem: _Problem) -> Iterator[_Problem]:
+    """The batch in pieces whose arrays stay in the cache; an empty batch is one piece."""
+    for i in range(0, max(1, len(problem.status)), CHUNK):
+        rows = slice(i, i + CHUNK)
+        yield replace(problem, points_px=problem.points_px[rows], status=problem.status[rows])
 
 
 def _validate(
@@ -166,7 +177,7 @@ def _rmse(problem: _Problem, R: Array, t: Array) -> Array:
 
 
 def _any_row(values: Mask) -> Mask:
-    return np.asarray(np.any(values.reshape(len(values), -1), axis=1))
+    return np.asarray(np.any(values, axis=tuple(range(1, values.ndim))))
 
 
 def _mark(status: NDArray[np.str_], failed: Mask, reason: Status) -> None:

@@ -104,6 +104,18 @@ def test_batch_equals_single_calls(method):
         np.testing.assert_allclose(batch.cam_from_obj.t[i], single.cam_from_obj.t, rtol=1e-12)
 
 
+@pytest.mark.parametrize("method", eposit.METHODS)
+def test_a_batch_may_be_empty_or_larger_than_a_chunk(method, monkeypatch):
+    camera, pose = paper_camera("equisolid"), helix_pose(0.0)
+    pixels = camera.project(pose.apply(PAPER_OBJECT)) + np.random.default_rng(19).normal(size=(7, 4, 2))
+    whole = eposit.solve(PAPER_OBJECT, pixels, camera, method)
+    monkeypatch.setattr("eposit.solver.CHUNK", 3)
+    parts = eposit.solve(PAPER_OBJECT, pixels, camera, method)
+    np.testing.assert_allclose(parts.cam_from_obj.t, whole.cam_from_obj.t, rtol=1e-12)
+    assert parts.covariance.shape == (7, 6, 6)
+    assert eposit.solve(PAPER_OBJECT, pixels[:0], camera, method).status.shape == (0,)
+
+
 @pytest.mark.parametrize("camera", ALL_CAMERAS, ids=lambda camera: camera.lens)
 @pytest.mark.parametrize("tilt", [0.0, 30.0, 70.0])
 def test_plain_chessboard_needs_no_circle(camera, tilt):
