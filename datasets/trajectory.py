@@ -12,8 +12,6 @@ from eposit.arrays import Array
 from eposit.pose import rotation_from_euler
 from render.target import Target
 
-NAMED_POINTS = ("board_centre", "origin")
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trajectory:

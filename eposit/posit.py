@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eposit.arrays import Array, Mask
+from eposit.arrays import Array, Mask, cross
 from eposit.camera import Camera
 from eposit.p3p import p3p_starts
 
@@ -190,7 +190,7 @@ def _scale_and_axis(vectors: Array) -> tuple[Array, Array]:
     """Scale 1 / Z0, the mean length of I and J, and the unit third axis k."""
     i, j = vectors[:3], vectors[3:]
     scale = 0.5 * (_norm(i) + _norm(j))
-    k = _cross(i, j)
+    k = cross(i, j)
     return scale, k / _norm(k)
 
 
@@ -201,13 +201,9 @@ def _pose(vectors: Array, x0: Array, y0: Array) -> tuple[Array, Array]:
     total, difference = i + j, i - j
     total, difference = total / _norm(total), difference / _norm(difference)
     i, j = (total + difference) * np.sqrt(0.5), (total - difference) * np.sqrt(0.5)
-    rotation = np.stack((i, j, _cross(i, j)))
+    rotation = np.stack((i, j, cross(i, j)))
     return np.ascontiguousarray(rotation.transpose(2, 0, 1)), np.stack((x0 * depth, y0 * depth, depth), axis=-1)
 
 
 def _norm(vector: Array) -> Array:
     return np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
-
-
-def _cross(a: Array, b: Array) -> Array:
-    return np.stack((a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]))

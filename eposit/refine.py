@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eposit.arrays import Array, Mask
+from eposit.arrays import Array, Mask, cross
 from eposit.camera import Camera
 
 STEP_TOL = 1e-11  # rad and relative translation; the floor of double precision is about 1e-13
@@ -104,7 +104,7 @@ def normal_equations(
     arm = np.stack((x, y, z)) - t.T[:, None, :]  # lever arm of the rotation
     jacobian = np.empty((6, *residual.shape))
     for row in range(2):
-        jacobian[:3, row] = _cross(arm, slope[row])
+        jacobian[:3, row] = cross(arm, slope[row])
         jacobian[3:, row] = slope[row]
     b = residual.shape[-1]
     normal, gradient = np.empty((b, 6, 6)), np.empty((b, 6))
@@ -143,10 +143,6 @@ def _sum(values: Array) -> Array:
     """Sum of (2, n, b) over all but b, in one order for any b: NumPy adds a single column pairwise."""
     flat = values.reshape(values.shape[0] * values.shape[1], values.shape[2])
     return np.cumsum(flat, axis=0)[-1] if flat.shape[1] == 1 else np.add.reduce(flat, axis=0)
-
-
-def _cross(a: Array, b: Array) -> Array:
-    return np.stack((a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]))
 
 
 def _turn(vector: Array, R: Array) -> Array:

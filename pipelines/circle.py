@@ -35,9 +35,7 @@ LEAST_PIXELS = 24
 LINES_PER_PX = 3  # integration lines of the blurred ellipse
 TOLERANCES = (0.2, 0.1, 0.05, 0.025, 0.015, 0.015)  # scale of the robust weights, as a share of black to white
 STEPS_EACH = 2
-NEAREST_SHARE = (
-    0.4  # of the board's side: nearer, a camera would not see all of it; bounds how much larger the circle is
-)
+NEAREST_SHARE = 0.4  # of the board's side: nearer, no camera sees all of it; bounds how much larger the circle is
 SIZE_SLACK = 0.005  # the board's map gives the size to this
 START_BLUR_PX = 0.8
 RESIDUAL_LIMIT = 0.06  # RMS of the fit as a share of the step from black to white

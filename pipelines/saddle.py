@@ -18,7 +18,7 @@ BLUR_LIMITS_PX = (0.2, 6.0)
 STEPS = 12
 STEP_LIMIT = np.array([0.7, 0.7, 0.15, 0.15, 0.3])  # largest change in one step: px, px, rad, rad, px
 STOP_PX = 1e-4
-U, V, ANGLE_1, ANGLE_2, BLUR = range(5)
+BLUR = 4  # place of the blur in a shape: u, v, two angles, blur
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,6 @@ class Saddles:
 
     points_px: Array  # (n, 2)
     blur_px: Array  # (n,) standard deviation of the blur
-    residual: Array  # (n,) RMS of the fit, grey levels
     moved_px: Array  # (n,) distance from the start
 
 
@@ -51,8 +50,7 @@ def fit_saddles(patches: Array, offsets: Array, weights: Array, angles: Array, s
         if np.all(np.abs(step[better, :2]) < STOP_PX) and np.all(better):
             break
     points = shape[:, :2]
-    residual = np.sqrt(cost / np.maximum(weights.sum(axis=1), 1.0))
-    return Saddles(points, shape[:, BLUR], residual, np.linalg.norm(points - starts, axis=1))
+    return Saddles(points, shape[:, BLUR], np.linalg.norm(points - starts, axis=1))
 
 
 def _edges(offsets: Array, shape: Array) -> tuple[Array, Array]:

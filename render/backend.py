@@ -100,8 +100,15 @@ def load() -> Any:
     mi.set_log_level(mi.LogLevel.Error)
     from render.sensor import register_sensor
 
-    register_sensor(mi)
+    register_sensor(mi, jit())
     return mi
+
+
+def jit() -> Any:
+    """Dr.Jit, for code that works on its arrays; `load` comes first."""
+    import drjit
+
+    return drjit
 
 
 def _checked_choice(library: Path) -> Path:

@@ -53,9 +53,8 @@ def sensor_dict(camera: Camera, cam_from_obj: Pose, region: tuple[int, int, int,
     }
 
 
-def register_sensor(mi: Any) -> None:
+def register_sensor(mi: Any, dr: Any) -> None:
     """Define and register the plugin; the variant is set by then."""
-    import drjit as dr
 
     class Fisheye(mi.Sensor):
         def __init__(self, props: Any) -> None:

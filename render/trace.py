@@ -37,9 +37,7 @@ def trace(
 def _trace_chunk(
     scene: Any, sensor: Any, pixels: Pixels, picture: tuple[int, int], samples: int, seed: int
 ) -> NDArray[np.float32]:
-    mi = backend.load()
-    import drjit as dr
-
+    mi, dr = backend.load(), backend.jit()
     index = dr.arange(mi.UInt32, len(pixels) * samples)
     pixel, sample = dr.gather(mi.UInt32, mi.UInt32(pixels), index // samples), index % samples
     width, height = dr.opaque(mi.UInt32, picture[0]), dr.opaque(mi.UInt32, picture[1])
