@@ -64,7 +64,12 @@ class CameraSpec:
     def nominal_camera(self) -> Camera:
         """Nominal focal length on both axes and the image centre as the principal point."""
         f = 0.5 * (self.fx + self.fy) if self.nominal_f is None else self.nominal_f
-        return self.true_camera().replace(fx=f, fy=f, cx=self.width / 2.0, cy=self.height / 2.0)
+        return assumed_camera(self.true_camera(), f)
+
+
+def assumed_camera(true: Camera, nominal_f: float) -> Camera:
+    """What a user without calibration assumes: the nominal focal length, px, and the image centre."""
+    return true.replace(fx=nominal_f, fy=nominal_f, cx=true.width / 2.0, cy=true.height / 2.0)
 
 
 class Recipe(BaseModel):

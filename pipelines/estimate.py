@@ -12,9 +12,10 @@ import pyarrow as pa
 import eposit
 from datasets.errors import UserError
 from datasets.plan import Stream, rng_for, shard_count
+from datasets.recipe import assumed_camera
 from datasets.schema import ESTIMATES, FRAMES
 from datasets.store import Dataset
-from eposit import Camera, Solution
+from eposit import Solution
 from eposit.arrays import Array
 from pipelines.rows import camera_of, points_by_frame, pose_columns, table
 
@@ -133,11 +134,7 @@ def solve_with(setting: Setting, points_in_obj: Array, batch: Array, frame: dict
     true = camera_of(frame)
     if setting.camera == "exact":
         return eposit.solve(points_in_obj, batch, true, setting.solver)
-    f, width, height = frame["nominal_f_px"], frame["width_px"], frame["height_px"]
-    nominal = Camera(
-        lens=true.lens, fx=f, fy=f, cx=width / 2.0, cy=height / 2.0,
-        width=width, height=height, coefficients=true.coefficients,
-    )  # fmt: skip
+    nominal = assumed_camera(true, frame["nominal_f_px"])
     if setting.camera == "nominal":
         return eposit.solve(points_in_obj, batch, nominal, setting.solver)
     shifted = nominal.replace(cx=true.cx, cy=true.cy)

@@ -7,9 +7,10 @@ and those need no rays.
 from __future__ import annotations
 
 import functools
+import io
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -241,12 +242,13 @@ def read_master(path: Path, key: str = "") -> Master:
 
 @contextmanager
 def _silent_library() -> Iterator[None]:
-    """Nothing reaches file descriptor 2: OpenEXR's library writes there what it raises as well."""
+    """Nothing is printed: OpenEXR's library writes what it raises to descriptor 2, its Python binding to sys.stdout."""
     kept = os.dup(2)
     try:
         with open(os.devnull, "wb") as nowhere:
             os.dup2(nowhere.fileno(), 2)
-        yield
+        with redirect_stdout(io.StringIO()):
+            yield
     finally:
         os.dup2(kept, 2)
         os.close(kept)
