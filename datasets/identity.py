@@ -27,6 +27,8 @@ def table_digest(table: pa.Table) -> str:
 def _values(column: Any) -> bytes:
     if pa.types.is_struct(column.type):
         return b"".join(_image(row) for row in column.to_pylist())
+    if pa.types.is_fixed_size_list(column.type):
+        return _values(column.flatten())
     if pa.types.is_floating(column.type):
         values = np.asarray(column.to_numpy(zero_copy_only=False), dtype="<f8")
         return np.where(np.isnan(values), np.nan, values + 0.0).tobytes()  # one NaN, one zero

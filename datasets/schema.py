@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pyarrow as pa
 
-SCHEMA_VERSION = "1"
+SCHEMA_VERSION = "2"
 MEANING = b"meaning"
 
 _STATUS = "ok, or the reason of failure; a failed row keeps its place with NaN"
@@ -26,7 +26,9 @@ _IMAGE = pa.struct([pa.field("bytes", pa.binary()), pa.field("path", pa.string()
 _KEY = [
     _field("frame_id", pa.int64(), "frame"),
     _field("solver", pa.string(), "solver that made the estimate"),
-    _field("points", pa.string(), "image points it was given: detected, truth, or truth with noise"),
+    _field(
+        "points", pa.string(), "image points it was given: detected (by which detector), truth, or truth with noise"
+    ),
     _field("camera", pa.string(), "camera it assumed: exact, nominal or paper"),
     _field("use", pa.string(), "object points it used: four or all"),
     _field("draw", pa.int32(), "draw of the point noise; 0 where there is none"),
@@ -88,8 +90,17 @@ KEYPOINTS = pa.schema(
 DETECTIONS = pa.schema(
     [
         _field("frame_id", pa.int64(), "frame"),
+        _field("detector", pa.string(), "what placed the corners: edge-fit, opencv-subpix or opencv-sb"),
         _field("point_id", pa.int32(), "point, as in keypoints"),
-        *_floats({"x_px": "detected image of the point", "y_px": "detected image of the point"}),
+        *_floats(
+            {
+                "x_px": "detected image of the point",
+                "y_px": "detected image of the point",
+                "var_x_px2": "stated variance of x",
+                "cov_xy_px2": "stated covariance of x and y",
+                "var_y_px2": "stated variance of y",
+            }
+        ),
         _field("status", pa.string(), _STATUS),
         _field("finder", pa.string(), "finder that saw the board; empty if none"),
         _field("blur_px", pa.float64(), "median blur of the board's edges"),
@@ -104,8 +115,16 @@ ESTIMATES = pa.schema(
         *_POSE,
         _field("iterations", pa.int32(), "iterations of start and refinement"),
         _field("reprojection_rmse_px", pa.float64(), "root mean squared reprojection error, assumed camera"),
+        _field(
+            "covariance",
+            pa.list_(pa.float64(), 36),
+            "6 x 6, row by row: rotation vector on the left in the camera frame, rad; then t, mm. NaN without noise",
+        ),
     ]
 )
+
+# Six components of a pose error in the order of a pose's covariance.
+COMPONENTS = ("wx", "wy", "wz", "tx", "ty", "tz")
 
 SCORES = pa.schema(
     [
@@ -122,6 +141,11 @@ SCORES = pa.schema(
                 "tz_error_mm": "estimate minus truth along z",
                 "t_error_relative": "length of the translation error over the true distance",
                 "reprojection_rmse_px": "root mean squared reprojection error, assumed camera",
+                **{
+                    f"{name}_normalised": f"error of {'rotation vector' if name[0] == 'w' else 'translation'} along "
+                    f"{name[1]} over its stated standard deviation"
+                    for name in COMPONENTS
+                },
             }
         ),
         _field("star", pa.bool_(), "the paper's star: no solution, or a translation at least twice the true one"),

@@ -30,7 +30,7 @@ def homography_start(points_in_obj: Array, bearings: Array) -> tuple[Array, Arra
     flat = (points_in_obj - centroid) @ axes[:2].T / size
     plane = np.column_stack((flat, np.ones(len(flat))))
     rows = np.concatenate([_cross_rows(bearings, axis, plane) for axis in range(3)], axis=1)
-    _, _, right = np.linalg.svd(rows, full_matrices=True)
+    _, _, right = np.linalg.svd(rows, full_matrices=False)
     free = right[:, -1].reshape(-1, 3, 3)
     facing = np.sign(np.sum((plane @ np.swapaxes(free, 1, 2)) * bearings, axis=(1, 2)))
     homography = free * np.where(facing == 0.0, 1.0, facing)[:, None, None]

@@ -1,6 +1,6 @@
 """The chessboard in an image, without any hint of where it is: found by OpenCV, put in the board's own order.
 
-Finders, in order: classic on the whole image (5 to 20 ms), classic on the textured region enlarged, sector-based.
+Finders, in order: classic on the textured region (a few ms), on the whole image, on the region enlarged; sector-based.
 """
 
 from __future__ import annotations
@@ -17,9 +17,13 @@ from render.target import Target
 
 Grey = NDArray[np.uint8]
 
-ENLARGEMENT = 3  # the classic finder needs squares of about 10 px; tilted ones are smaller
+ENLARGEMENT = 3.0  # the classic finder needs squares of about 10 px; tilted ones are smaller
+LEAST_ENLARGEMENT, MOST_PIXELS = 1.3, 8e6  # of an enlarged region; larger ones take seconds
 CLASSIC_FLAGS = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
 SECTOR_FLAGS = cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_EXHAUSTIVE
+DECIMATION = 4  # of the picture in which texture is looked for
+REGION_MARGIN_PX = 16
+LEAST_GRADIENT = 16  # grey values between neighbours that count as texture
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,44 +46,70 @@ def find_board(image: Grey, target: Target) -> Found | None:
     return None
 
 
+def find_sector_based(image: Grey, target: Target) -> Found | None:
+    """The board as `cv2.findChessboardCornersSB` alone sees it, to its own accuracy."""
+    corners = _sector_based(image, target.inner)
+    ordered = None if corners is None else _ordered(image, corners.reshape(-1, 2), target)
+    return None if ordered is None else Found(ordered, "sector")
+
+
 def _classic(image: Grey, inner: tuple[int, int]) -> Array | None:
+    part, offset = _region_of(image)
+    found, corners = cv2.findChessboardCorners(part, inner, flags=CLASSIC_FLAGS)
+    return corners + offset if found else None
+
+
+def _whole(image: Grey, inner: tuple[int, int]) -> Array | None:
     found, corners = cv2.findChessboardCorners(image, inner, flags=CLASSIC_FLAGS | cv2.CALIB_CB_FAST_CHECK)
     return np.asarray(corners, np.float64) if found else None
 
 
 def _enlarged(image: Grey, inner: tuple[int, int]) -> Array | None:
-    x, y, width, height = textured_region(image)
-    part = image[y : y + height, x : x + width]
-    large = cv2.resize(part, None, fx=ENLARGEMENT, fy=ENLARGEMENT, interpolation=cv2.INTER_CUBIC)
+    part, offset = _region_of(image)
+    scale = min(ENLARGEMENT, float(np.sqrt(MOST_PIXELS / part.size)))
+    if scale < LEAST_ENLARGEMENT:
+        return None
+    large = cv2.resize(part, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
     found, corners = cv2.findChessboardCorners(large, inner, flags=CLASSIC_FLAGS)
-    # Pixel centres at integers: the centre of pixel 0 lies (ENLARGEMENT - 1) / 2 into the enlarged image.
-    return (corners - (ENLARGEMENT - 1) / 2) / ENLARGEMENT + np.array([x, y]) if found else None
+    # Pixel centres at integers: the centre of pixel 0 lies (scale - 1) / 2 into the enlarged image.
+    return (corners - (scale - 1.0) / 2.0) / scale + offset if found else None
 
 
 def _sector_based(image: Grey, inner: tuple[int, int]) -> Array | None:
-    x, y, width, height = textured_region(image)
-    part = np.ascontiguousarray(image[y : y + height, x : x + width])
-    found, corners = cv2.findChessboardCornersSB(part, inner, flags=SECTOR_FLAGS)
-    return corners + np.array([x, y]) if found else None
+    part, offset = _region_of(image)
+    if not cv2.checkChessboard(part, inner):  # the finder would take a minute for a large picture of noise
+        return None
+    found, corners = cv2.findChessboardCornersSB(np.ascontiguousarray(part), inner, flags=SECTOR_FLAGS)
+    return corners + offset if found else None
 
 
 FINDERS: dict[str, Callable[[Grey, tuple[int, int]], Array | None]] = {
     "classic": _classic,
+    "whole": _whole,
     "enlarged": _enlarged,
     "sector": _sector_based,
 }
 
 
-def textured_region(image: Grey, margin: int = 12) -> tuple[int, int, int, int]:
-    """x, y, width, height of the pixels with strong edges; the whole image if there are none."""
-    gradient = cv2.morphologyEx(image, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))
-    strong = gradient > max(16, int(gradient.max()) // 3)
+def _region_of(image: Grey) -> tuple[Grey, Array]:
+    x, y, width, height = textured_region(image)
+    return image[y : y + height, x : x + width], np.array([x, y], np.float64)
+
+
+def textured_region(image: Grey) -> tuple[int, int, int, int]:
+    """x, y, width, height of the pixels with strong edges and a margin; the whole image if there are none."""
+    small = cv2.resize(image, None, fx=1.0 / DECIMATION, fy=1.0 / DECIMATION, interpolation=cv2.INTER_LINEAR)
+    gradient = cv2.morphologyEx(small, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))
+    strong = gradient > max(LEAST_GRADIENT, int(gradient.max()) // 3)
     columns, rows = np.flatnonzero(strong.any(axis=0)), np.flatnonzero(strong.any(axis=1))
     if not len(columns):
         return 0, 0, image.shape[1], image.shape[0]
-    x0, x1 = max(0, columns[0] - margin), min(image.shape[1], columns[-1] + margin + 1)
-    y0, y1 = max(0, rows[0] - margin), min(image.shape[0], rows[-1] + margin + 1)
-    return int(x0), int(y0), int(x1 - x0), int(y1 - y0)
+    x0, y0 = (max(0, DECIMATION * int(line[0]) - REGION_MARGIN_PX) for line in (columns, rows))
+    x1, y1 = (
+        min(size, DECIMATION * (int(line[-1]) + 1) + REGION_MARGIN_PX)
+        for line, size in ((columns, image.shape[1]), (rows, image.shape[0]))
+    )
+    return x0, y0, x1 - x0, y1 - y0
 
 
 def _ordered(image: Grey, corners: Array, target: Target) -> Array | None:
@@ -89,20 +119,11 @@ def _ordered(image: Grey, corners: Array, target: Target) -> Array | None:
     along_x, along_y = grid[:, -1].mean(0) - grid[:, 0].mean(0), grid[-1].mean(0) - grid[0].mean(0)
     if along_x[0] * along_y[1] - along_x[1] * along_y[0] < 0.0:
         grid = grid[::-1]
-    turned = grid[::-1, ::-1]
-    first, last = _grey(image, _outer_square(grid)), _grey(image, _outer_square(turned))
-    if first is None or last is None:
+    # Half a turn exchanges black and white. The square between the first four corners is black, as the first is.
+    middles = (grid[1:, 1:] + grid[1:, :-1] + grid[:-1, 1:] + grid[:-1, :-1]) / 4.0
+    x, y = (np.rint(middles[..., k]).astype(int) for k in range(2))
+    if x.min() < 0 or y.min() < 0 or x.max() >= image.shape[1] or y.max() >= image.shape[0]:
         return None
-    return (grid if first < last else turned).reshape(-1, 2)
-
-
-def _outer_square(corners: Array) -> Array:
-    """Centre of the outer square at the first corner of a (down, across, 2) grid, extrapolated along the diagonal."""
-    return (15.0 * corners[0, 0] - 10.0 * corners[1, 1] + 3.0 * corners[2, 2]) / 8.0
-
-
-def _grey(image: Grey, point: Array) -> float | None:
-    x, y = np.rint(point).astype(int)
-    if not (0 <= x < image.shape[1] and 0 <= y < image.shape[0]):
-        return None
-    return float(image[max(0, y - 1) : y + 2, max(0, x - 1) : x + 2].mean())
+    black = np.add.outer(np.arange(down - 1), np.arange(across - 1)) % 2 == 0
+    grey = image[y, x]
+    return (grid if grey[black].mean() < grey[~black].mean() else grid[::-1, ::-1]).reshape(-1, 2)

@@ -19,6 +19,7 @@ Out = Annotated[Path, typer.Option("--out", help="Folder of the dataset; a run t
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a dataset.")]
 RecipeName = Annotated[str, typer.Argument(metavar="RECIPE", help="A .toml file, or a name from `recipes`.")]
 Workers = Annotated[int, typer.Option(help="Processes; the result is the same for any number.")]
+DetectorName = Annotated[str, typer.Option("--detector", help="edge-fit (ours), opencv-subpix or opencv-sb.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars.")]
 
 app = typer.Typer(
@@ -54,12 +55,12 @@ def generate(recipe: RecipeName, out: Out, workers: Workers = 1, quiet: Quiet = 
     stages.run_generate(_claim(recipe, out), workers, Console(quiet=quiet))
 
 
-@app.command(epilog="Example: python -m pipelines detect out/demo")
-def detect(folder: Folder, workers: Workers = 1, quiet: Quiet = False) -> None:
-    """Find corners and circle in the images."""
+@app.command(epilog="Example: python -m pipelines detect out/demo --detector opencv-subpix")
+def detect(folder: Folder, detector: DetectorName = "edge-fit", workers: Workers = 1, quiet: Quiet = False) -> None:
+    """Find corners and circle in the images; each detector's points stay beside the others'."""
     from pipelines import stages
 
-    stages.run_detect(_open(folder), workers, Console(quiet=quiet))
+    stages.run_detect(_open(folder), workers, Console(quiet=quiet), detector)
 
 
 @app.command(
@@ -73,6 +74,7 @@ def estimate(
     use: Annotated[str, typer.Option(help="Object points: four or all.")] = "all",
     noise_px: Annotated[float, typer.Option(help="Standard deviation of truth+noise, px per axis.")] = 0.4,
     draws: Annotated[int, typer.Option(help="Draws of truth+noise.")] = 5,
+    detector: DetectorName = "edge-fit",
     workers: Workers = 1,
     quiet: Quiet = False,
 ) -> None:
@@ -80,7 +82,7 @@ def estimate(
     from pipelines import stages
     from pipelines.estimate import Setting
 
-    setting = Setting(solver, points, camera, use, noise_px, draws)
+    setting = Setting(solver, points, camera, use, noise_px, draws, detector)
     stages.run_estimate(_open(folder), [setting], workers, Console(quiet=quiet))
 
 

@@ -1,39 +1,64 @@
-"""Stage 2: find the target's points in the images, from the PNG's bytes and the target's dimensions alone."""
+"""Stage 2: find the target's points in the images, from the PNG's bytes and the target's dimensions alone.
+
+Each detector has its own shards beside the others'; those of our own have no name in theirs.
+"""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 
+from datasets.errors import UserError
 from datasets.plan import shard_count
 from datasets.schema import DETECTIONS
 from datasets.store import Dataset
-from pipelines.detection import detect_points
+from pipelines.detection import Detector, detect_points
 from pipelines.rows import decode_image, table
 
 
-def is_done(dataset: Dataset, index: int) -> bool:
+def check_detector(name: str) -> None:
+    """Refuse an unknown detector.
+
+    Raises:
+        UserError: with the known ones.
+    """
+    if name not in list(Detector):
+        raise UserError(f"unknown detector {name!r}; choose one of {', '.join(Detector)}")
+
+
+def path_of(dataset: Dataset, index: int, detector: str) -> Path:
+    """Place of one shard."""
+    variant = "" if detector == Detector.EDGE_FIT else detector
+    return dataset.shard_path("detections", index, shard_count(dataset.recipe), variant)
+
+
+def is_done(dataset: Dataset, index: int, detector: str) -> bool:
     """Whether a shard is there."""
-    return dataset.is_done(dataset.shard_path("detections", index, shard_count(dataset.recipe)))
+    return dataset.is_done(path_of(dataset, index, detector))
 
 
-def run_shard(dataset: Dataset, index: int) -> None:
+def run_shard(dataset: Dataset, index: int, detector: str) -> None:
     """Make one shard of `detections` from the same shard of `frames`."""
-    count = shard_count(dataset.recipe)
-    path = dataset.shard_path("frames", index, count)
-    frames = dataset.read_shard(path)
+    path = dataset.shard_path("frames", index, shard_count(dataset.recipe))
+    frames = dataset.read_shard(path, ["frame_id", "image"])
     parts: list[pa.Table] = []
     for frame_id, image in zip(frames["frame_id"].to_pylist(), frames["image"].to_pylist(), strict=True):
-        found = detect_points(decode_image(image, path, frame_id), dataset.recipe.target)
+        found = detect_points(decode_image(image, path, frame_id), dataset.recipe.target, detector)
         n = len(found.status)
         columns = {
             "frame_id": np.full(n, frame_id),
+            "detector": np.full(n, detector),
             "point_id": np.arange(n),
             "x_px": found.points_px[:, 0],
             "y_px": found.points_px[:, 1],
+            "var_x_px2": found.covariance_px2[:, 0, 0],
+            "cov_xy_px2": found.covariance_px2[:, 0, 1],
+            "var_y_px2": found.covariance_px2[:, 1, 1],
             "status": found.status,
             "finder": np.full(n, found.finder),
             "blur_px": np.full(n, found.blur_px),
         }
         parts.append(table(DETECTIONS, columns))
-    dataset.write_shard(dataset.shard_path("detections", index, count), pa.concat_tables(parts))
+    dataset.write_shard(path_of(dataset, index, detector), pa.concat_tables(parts))

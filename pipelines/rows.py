@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute  # `pa.compute` is there only after its own import
 from numpy.typing import NDArray
 
 from datasets.errors import UserError
@@ -69,6 +70,20 @@ def decode_image(image: dict[str, Any], path: Path, frame_id: int) -> NDArray[np
     except ValueError as error:
         raise UserError(f"{path}, frame {frame_id}: {error}; delete it and run the generate stage again") from None
     return pixels
+
+
+def of_detector(detections: pa.Table, detector: str) -> pa.Table:
+    """The rows of one detector."""
+    return detections.filter(pa.compute.equal(detections["detector"], detector))
+
+
+def covariances_by_frame(rows: pa.Table, target: Target) -> dict[int, Array]:
+    """frame_id to (n, 2, 2) px^2 from rows of `detections`."""
+    count = len(target.points)
+    xx, xy, yy = (rows[name].to_numpy() for name in ("var_x_px2", "cov_xy_px2", "var_y_px2"))
+    found = np.stack((xx, xy, xy, yy), axis=1).reshape(-1, count, 2, 2)
+    frame = rows["frame_id"].to_numpy()
+    return {int(frame[i * count]): found[i] for i in range(len(found))}
 
 
 def points_by_frame(rows: pa.Table, target: Target) -> dict[int, Array]:

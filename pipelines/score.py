@@ -5,10 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 
-from datasets.schema import SCORES
+from datasets.schema import COMPONENTS, SCORES
 from datasets.store import Dataset
-from eposit.pose import euler_error_rad, rotation_error_rad
+from eposit.arrays import Array
+from eposit.pose import euler_error_rad, rotation_error_rad, rotation_error_vector
 from pipelines.rows import poses, table
 
 KEY = ("frame_id", "solver", "points", "camera", "use", "draw", "status")
@@ -47,12 +49,24 @@ def run_shard(dataset: Dataset, estimates: Path) -> None:
         "t_error_relative": np.linalg.norm(t_error, axis=1) / np.linalg.norm(true.t, axis=1),
         "reprojection_rmse_px": rows["reprojection_rmse_px"],
         "star": star,
+        **_normalised(rows, rotation_error_vector(found.R, true.R), t_error),
     }
     arrays = {
         name: value.combine_chunks() if hasattr(value, "combine_chunks") else value
         for name, value in (columns | scores).items()
     }
     dataset.write_shard(_path(dataset, estimates), table(SCORES, arrays))
+
+
+def _normalised(rows: pa.Table, rotation: Array, translation: Array) -> dict[str, Array]:
+    """Errors over their stated standard deviations, NaN without them.
+
+    rotation: (b, 3) vectors on the left, rad. translation: (b, 3) mm.
+    """
+    stated = rows["covariance"].combine_chunks().flatten().to_numpy(zero_copy_only=False).reshape(-1, 6, 6)
+    with np.errstate(invalid="ignore"):
+        values = np.hstack((rotation, translation)) / np.sqrt(np.einsum("bii->bi", stated))
+    return {f"{name}_normalised": values[:, i] for i, name in enumerate(COMPONENTS)}
 
 
 def _path(dataset: Dataset, estimates: Path) -> Path:

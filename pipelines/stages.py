@@ -13,6 +13,7 @@ from rich.text import Text
 from datasets.plan import shard_count
 from datasets.store import Dataset
 from pipelines import detect, estimate, generate, score
+from pipelines.detection import Detector
 from pipelines.engine import check_workers, map_shards
 from pipelines.estimate import Setting
 
@@ -41,10 +42,22 @@ def run_generate(dataset: Dataset, workers: int, console: Console) -> None:
     _run("generate", dataset, indices, generate.is_done, generate.run_shard, workers, console)
 
 
-def run_detect(dataset: Dataset, workers: int, console: Console) -> None:
-    """Detect what is missing."""
-    indices = range(shard_count(dataset.recipe))
-    _run("detect", dataset, indices, detect.is_done, detect.run_shard, workers, console)
+def run_detect(dataset: Dataset, workers: int, console: Console, detector: str = Detector.EDGE_FIT) -> None:
+    """Detect what is missing.
+
+    Raises:
+        UserError: an unknown detector.
+    """
+    detect.check_detector(detector)
+    _run(
+        "detect" if detector == Detector.EDGE_FIT else f"detect {detector}",
+        dataset,
+        range(shard_count(dataset.recipe)),
+        functools.partial(detect.is_done, detector=detector),
+        functools.partial(detect.run_shard, detector=detector),
+        workers,
+        console,
+    )
 
 
 def run_estimate(dataset: Dataset, settings: Iterable[Setting], workers: int, console: Console) -> None:

@@ -1,4 +1,4 @@
-"""A smooth map from board to image, fitted to the corners. It needs no camera: any lens is smooth across a board."""
+"""The smooth map from board to image, fitted to the corners of one picture. It needs no camera and no lens."""
 
 from __future__ import annotations
 
@@ -7,50 +7,95 @@ from dataclasses import dataclass
 import numpy as np
 
 from eposit.arrays import Array, Mask
+from eposit.planar import homography_start
+from pipelines import freelens
 
-DEGREE = 5  # leaves 0.02 px on a fish-eye board 500 px wide, and 0.4 px where it fills the picture
+FOCAL_SHARES = (0.2, 0.3, 0.45, 0.7, 1.1, 2.0)  # focal lengths to start from, as shares of the picture's width
+WIDEST_RAD = 2.2  # largest angle of a ray that a start may give a corner
+FIT_STEPS = 30
+FREE = np.array([0.0, 2e-2, 100.0, 100.0, 0.3, 0.3, 0.3])  # how far a lens may lie from the start: see `freelens`
+HOLD_SHARE = 1e-6  # weight of that against one pixel of one corner: it decides only what nothing else does
+BEND_STEP = 0.05  # squares; second differences at this step are good to 1e-5 px
+OUTLIER_PX = 1.5  # a worst corner farther off than this has all corners weighed by their distances
+GENTLE_PX = 0.5  # distance at which such a weight is one half
 
 
 @dataclass(frozen=True, slots=True)
 class BoardMap:
-    """Polynomial map from board coordinates (squares, first inner corner at the origin) to px."""
+    """Map from board coordinates (squares, first inner corner at the origin, z into the board) to px."""
 
-    coefficients: Array  # (terms, 2)
-    inner: tuple[int, int]  # inner corners along x and y
+    R: Array  # (3, 3)
+    t: Array  # (3,) squares
+    lens: Array  # (7,) see `freelens`
 
     @staticmethod
-    def fit(corners_px: Array, inner: tuple[int, int], use: Mask | None = None) -> BoardMap:
-        """Least squares over (n, 2) corners, or over those in the (n,) mask."""
-        use = np.ones(len(corners_px), bool) if use is None else use
-        basis = _basis(inner, grid(inner))
-        return BoardMap(np.linalg.lstsq(basis[use], corners_px[use], rcond=None)[0], inner)
+    def fit(
+        at: Array, corners_px: Array, size: tuple[int, int], weights: Array, start: BoardMap | None = None
+    ) -> BoardMap:
+        """Least squares over corners (n, 2) px of points (n, 2) in squares.
 
-    def __call__(self, at: Array) -> Array:
-        """(m, 2) or (2,) board coordinates to (m, 2) px."""
-        return _basis(self.inner, np.atleast_2d(at)) @ self.coefficients
-
-    def jacobian(self, at: Array, step: float = 1e-3) -> Array:
-        """(m, 2, 2) px per square at (m, 2) board coordinates; (2, 2) at one. Columns are along x and along y."""
-        points = np.atleast_2d(at)
-        columns = [(self(points + d) - self(points - d)) / (2.0 * step) for d in np.eye(2) * step]
-        slopes = np.stack(columns, axis=-1)
-        return slopes[0] if np.ndim(at) == 1 else slopes
-
-    def invert(self, point_px: Array, start: Array) -> Array:
-        """(2,) board coordinates whose image is (2,) px, by Newton's method from `start`."""
-        at = np.array(start, dtype=np.float64)
-        for _ in range(4):
-            at = at + np.linalg.solve(self.jacobian(at), point_px - self(at)[0])
-        return at
-
-    def parallax(self, at: Array, height: float) -> Array:
-        """(2,) px that a point `height` squares above the board is displaced by, up to its sign.
-
-        Under a local scaled orthography the map's singular values are s and s cos(tilt); the normal is displaced by
-        s sin(tilt) along the direction that is foreshortened.
+        size: width and height of the picture, px. weights: (n,) inverse variances, 0 for a corner that takes no part.
+        start: a map near by; without it, focal lengths over the whole range are tried.
         """
-        left, singular, _ = np.linalg.svd(self.jacobian(at))
-        return left[:, 1] * height * np.sqrt(max(singular[0] ** 2 - singular[1] ** 2, 0.0))
+        begin = _start(at, corners_px, size, weights > 0.0) if start is None else start
+        hold = np.zeros(7)
+        hold[1:] = HOLD_SHARE * np.median(weights[weights > 0.0]) / FREE[1:] ** 2
+        x, y = (np.ascontiguousarray(column) for column in at.T)
+        pixels = np.where(weights[:, None] > 0.0, corners_px, 0.0)
+        return BoardMap(*freelens.fit(begin.R, begin.t, begin.lens, x, y, pixels, weights, hold, FIT_STEPS))
+
+    @staticmethod
+    def fit_rough(at: Array, corners_px: Array, size: tuple[int, int], use: Mask) -> BoardMap:
+        """The map through corners of which some may be a few pixels off."""
+        board = BoardMap.fit(at, corners_px, size, use.astype(np.float64))
+        distance = np.linalg.norm(board(at) - corners_px, axis=1)
+        if distance[use].max() <= OUTLIER_PX:
+            return board
+        return BoardMap.fit(at, corners_px, size, use / (1.0 + (distance / GENTLE_PX) ** 2), board)
+
+    def __call__(self, at: Array, height: float = 0.0) -> Array:
+        """(m, 2) or (2,) points in squares, `height` squares above the board, to (m, 2) or (2,) px."""
+        points = np.atleast_2d(np.asarray(at, np.float64))
+        pixels = np.empty(points.shape)
+        x, y = np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1])
+        freelens.project(self.R, self.t, self.lens, x, y, -height, pixels)
+        return pixels[0] if np.ndim(at) == 1 else pixels
+
+    def jacobian(self, at: Array, height: float = 0.0, step: float = 1e-3) -> Array:
+        """(m, 2, 2) or (2, 2) px per square; columns are along x and along y."""
+        around = np.concatenate([np.atleast_2d(at) + sign * d for d in np.eye(2) * step for sign in (1.0, -1.0)])
+        xp, xm, yp, ym = self(around, height).reshape(4, -1, 2)
+        slope = np.stack((xp - xm, yp - ym), axis=-1) / (2.0 * step)
+        return slope[0] if np.ndim(at) == 1 else slope
+
+    def curvatures(self, at: Array, jacobian: Array) -> Array:
+        """(m, 2) curvatures, 1/px, of the images of the lines through (m, 2) points along y and along x.
+
+        Each is towards the normal (cos, sin) at the angle that `normal_angles` gives for the line.
+        """
+        around = np.concatenate([at + d for d in (*(np.eye(2) * BEND_STEP), *(-np.eye(2) * BEND_STEP), np.zeros(2))])
+        xp, yp, xm, ym, middle = self(around).reshape(5, -1, 2)
+        angles = normal_angles(jacobian)
+        bends = np.stack((yp + ym - 2.0 * middle, xp + xm - 2.0 * middle), axis=1) / BEND_STEP**2
+        normals = np.stack((np.cos(angles), np.sin(angles)), axis=-1)
+        lengths = np.sum(jacobian[:, :, ::-1] ** 2, axis=1)  # squared length of the image of a square along y, along x
+        return np.sum(bends * normals, axis=-1) / lengths
+
+    def slopes(self, at: Array) -> Array:
+        """(m, 2, 13) change of the pixels for a change of each of the map's parameters."""
+        out = np.empty((2 * len(at), freelens.PARAMETERS))
+        x, y = (np.ascontiguousarray(column) for column in at.T)
+        freelens.slopes(self.R, self.t, self.lens, x, y, out)
+        return out.reshape(-1, 2, freelens.PARAMETERS)
+
+    def meet_planes(self, x_px: Array, y_px: Array, heights: Array) -> Array:
+        """(k, 2, h, w) points, in squares, where the rays of a grid of pixels meet planes above the board.
+
+        x_px: (w,) columns. y_px: (h,) rows. heights: (k,) squares above the board.
+        """
+        out = np.empty((len(heights), 2, len(y_px), len(x_px)))
+        freelens.meet_planes(self.R, self.t, self.lens, x_px, y_px, -np.asarray(heights, np.float64), out)
+        return out
 
 
 def grid(inner: tuple[int, int]) -> Array:
@@ -59,19 +104,23 @@ def grid(inner: tuple[int, int]) -> Array:
     return np.stack((x.ravel(), y.ravel()), axis=1).astype(np.float64)
 
 
-def leave_one_out(corners_px: Array, inner: tuple[int, int], use: Mask) -> Array:
-    """(n,) distance of each corner from the map fitted to the others in the (n,) mask, px."""
-    basis = _basis(inner, grid(inner))
-    coefficients = np.linalg.pinv(basis[use])
-    leverage = np.zeros(len(basis))
-    leverage[use] = np.einsum("ij,ji->i", basis[use], coefficients)
-    misses = corners_px - basis @ (coefficients @ corners_px[use])
-    return np.linalg.norm(misses, axis=1) / np.maximum(1.0 - leverage, 1e-6)
+def normal_angles(jacobian: Array) -> Array:
+    """(m, 2) directions, rad, of the normals of the images of lines along y and along x."""
+    along_x, along_y = jacobian[:, :, 0], jacobian[:, :, 1]
+    return np.stack((np.arctan2(-along_y[:, 0], along_y[:, 1]), np.arctan2(-along_x[:, 0], along_x[:, 1])), axis=1)
 
 
-def _basis(inner: tuple[int, int], at: Array) -> Array:
-    """(m, terms) monomials at board coordinates scaled to [-1, 1]."""
-    x, y = (at / np.array([inner[0] - 1, inner[1] - 1]) * 2.0 - 1.0).T
-    most_x, most_y = min(DEGREE, inner[0] - 2), min(DEGREE, inner[1] - 2)
-    powers = [(i, j) for i in range(most_x + 1) for j in range(most_y + 1) if i + j <= DEGREE]
-    return np.stack([x**i * y**j for i, j in powers], axis=1)
+def _start(at: Array, corners_px: Array, size: tuple[int, int], use: Mask) -> BoardMap:
+    """The best of the equidistance lenses at the picture's centre, each with the pose that its homography gives."""
+    centre = (np.array(size) - 1.0) / 2.0
+    points, offset = np.column_stack((at[use], np.zeros(np.sum(use)))), corners_px[use] - centre
+    radius = np.linalg.norm(offset, axis=1)
+    shares = [share for share in FOCAL_SHARES if radius.max() / (share * size[0]) < WIDEST_RAD]
+    focal = np.array(shares or [radius.max() / WIDEST_RAD / size[0]]) * size[0]
+    theta = radius / focal[:, None]
+    side = np.sin(theta) / np.maximum(radius, 1e-9)
+    bearings = np.concatenate((offset * side[..., None], np.cos(theta)[..., None]), axis=-1)
+    R, t = homography_start(points, bearings)
+    maps = [BoardMap(R[i], t[i], np.array([focal[i], 0.0, *centre, 0.0, 0.0, 0.0])) for i in range(len(focal))]
+    misses = [np.sum((board(at[use]) - corners_px[use]) ** 2) for board in maps]
+    return maps[int(np.argmin(misses))]

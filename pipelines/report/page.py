@@ -9,10 +9,11 @@ import jinja2
 import numpy as np
 
 from datasets.store import RECIPE_FILE, Dataset, refused
+from pipelines.detection import Detector
 from pipelines.doctor import versions
 from pipelines.report import figures
 from pipelines.report.data import ERRORS, detection_rows, score_rows, series
-from pipelines.rows import decode_image, points_by_frame
+from pipelines.rows import decode_image, of_detector, points_by_frame
 from render.files import replace_atomically
 
 REPORT = "report.html"
@@ -65,7 +66,7 @@ def write_report(dataset: Dataset) -> Path:
 def _gallery(dataset: Dataset, frames: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Evenly chosen frames with their detected points."""
     chosen = {frames[int(i)]["frame_id"] for i in np.linspace(0, len(frames) - 1, min(GALLERY, len(frames))).round()}
-    points = points_by_frame(dataset.read("detections"), dataset.recipe.target)
+    points = points_by_frame(of_detector(dataset.read("detections"), Detector.EDGE_FIT), dataset.recipe.target)
     pictures: list[dict[str, Any]] = []
     for path in dataset.shards("frames"):
         ids = dataset.read_shard(path, ["frame_id"])["frame_id"].to_pylist()
