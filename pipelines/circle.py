@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from eposit.arrays import Array, Mask
 from pipelines.board import Grey
@@ -46,8 +47,8 @@ class _Patch:
     """A part of the image around the circle, and the fine grid over it in radii of the circle."""
 
     grey: Array  # (n,) pixels that take part
-    rows: Array  # (n,)
-    columns: Array  # (n,)
+    rows: NDArray[np.intp]  # (n,)
+    columns: NDArray[np.intp]  # (n,)
     on_board: Array  # (2, h, w) from the circle's foot
     on_disc: Array  # (2, h, w) from its centre, on its plane
     fields: Array  # (3, h, w) for `fit_disc`

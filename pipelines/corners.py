@@ -90,7 +90,7 @@ def _fit(image: Grey, board: BoardMap, target: Target, shapes: Array, window: in
         good = np.linalg.norm(points - starts, axis=1) <= START_LIMIT * side
         good &= fitted[:, CONTRAST] * _sense(target) > 0.0
         good &= np.all(np.isfinite(covariance), axis=(1, 2)) & (np.linalg.det(covariance) > 0.0)
-        good &= converged | (window == FIRST_WINDOW_PX)
+        good &= converged if window == WINDOW_PX else True
     if not np.any(good):
         return Corners(points, covariance, good, np.nan, np.nan, board)
     blur, contrast = np.median(fitted[good, BLUR]), 2.0 * np.median(np.abs(fitted[good, CONTRAST]))

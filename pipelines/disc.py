@@ -14,10 +14,12 @@ import math
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from eposit.arrays import Array
 from pipelines.blur import REORDER, decay, signed_share
 
+Places = NDArray[np.intp]
 # Numbers of a fit, in order: disc x, y, in radii from where it is expected, and its size as a ratio; shadow x, y from
 # the foot and the softness of its rim, in radii; then k, w, gx, gy (per radius), A, L in grey values.
 SHAPE, LINEAR = 6, 6
@@ -52,7 +54,7 @@ def _shadow(u: Array, p: Array, out: Array) -> None:
 
 
 @njit(cache=True, fastmath=REORDER)
-def _blurred(fine: Array, kernel: Array, finer: int, rows: Array, columns: Array, held: Array, out: Array) -> None:
+def _blurred(fine: Array, kernel: Array, finer: int, rows: Places, columns: Places, held: Array, out: Array) -> None:
     """Separable blur of a fine grid, sampled at the pixels (n,), (n,) of the patch into `out` (n,)."""
     taps, height, width = len(kernel), held.shape[0], fine.shape[1]
     first = (finer - taps) // 2
@@ -72,8 +74,8 @@ def _blurred(fine: Array, kernel: Array, finer: int, rows: Array, columns: Array
 @njit(cache=True)
 def fit_disc(
     grey: Array,
-    rows: Array,
-    columns: Array,
+    rows: Places,
+    columns: Places,
     u: Array,
     v: Array,
     fields: Array,

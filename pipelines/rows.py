@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute  # `pa.compute` is there only after its own import
 from numpy.typing import NDArray
 
 from datasets.errors import UserError
@@ -74,7 +73,7 @@ def decode_image(image: dict[str, Any], path: Path, frame_id: int) -> NDArray[np
 
 def of_detector(detections: pa.Table, detector: str) -> pa.Table:
     """The rows of one detector."""
-    return detections.filter(pa.compute.equal(detections["detector"], detector))
+    return detections.filter(pa.array(detections["detector"].to_numpy(zero_copy_only=False) == detector))
 
 
 def covariances_by_frame(rows: pa.Table, target: Target) -> dict[int, Array]:

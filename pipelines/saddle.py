@@ -20,8 +20,9 @@ import math
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from eposit.arrays import Array
+from eposit.arrays import Array, Mask
 from pipelines.blur import GAUSS, REORDER, decay, signed_share
 
 # Numbers of a shape, in order: corner x, y, px from the start; directions of the two normals, rad; blur sigma, px;
@@ -100,7 +101,7 @@ def _solve(normal: Array, right: Array, damping: float, out: Array) -> bool:
 
 @njit(cache=True)
 def _gather(
-    image: Array,
+    image: NDArray[np.uint8],
     start: Array,
     inverse: Array,
     reach: Array,
@@ -142,7 +143,7 @@ def _levels(p: Array, jacobian: Array, grey: Array, n: int) -> None:
 
 @njit(cache=True)
 def fit_corners(
-    image: Array,
+    image: NDArray[np.uint8],
     starts: Array,
     shapes: Array,
     bends: Array,
@@ -153,7 +154,7 @@ def fit_corners(
     disc_axes: Array,
     steps: int,
     stop_px: float,
-) -> tuple[Array, Array, Array, Array]:
+) -> tuple[Array, Array, NDArray[np.int64], Mask]:
     """Fit every corner by Levenberg-Marquardt.
 
     image: (height, width) 8 bits. starts: (n, 2) px. shapes: (n, 9) where to start from; without a mean grey (NaN),

@@ -12,6 +12,7 @@ from pipelines import freelens
 
 FOCAL_SHARES = (0.2, 0.3, 0.45, 0.7, 1.1, 2.0)  # focal lengths to start from, as shares of the picture's width
 WIDEST_RAD = 2.2  # largest angle of a ray that a start may give a corner
+START_CORNERS = 16  # that a start is worked out from
 FIT_STEPS = 30
 FREE = np.array([0.0, 2e-2, 100.0, 100.0, 0.3, 0.3, 0.3])  # how far a lens may lie from the start: see `freelens`
 HOLD_SHARE = 1e-6  # weight of that against one pixel of one corner: it decides only what nothing else does
@@ -113,7 +114,8 @@ def normal_angles(jacobian: Array) -> Array:
 def _start(at: Array, corners_px: Array, size: tuple[int, int], use: Mask) -> BoardMap:
     """The best of the equidistance lenses at the picture's centre, each with the pose that its homography gives."""
     centre = (np.array(size) - 1.0) / 2.0
-    points, offset = np.column_stack((at[use], np.zeros(np.sum(use)))), corners_px[use] - centre
+    some = np.flatnonzero(use)[:: max(1, int(np.sum(use)) // START_CORNERS)]
+    points, offset = np.column_stack((at[some], np.zeros(len(some)))), corners_px[some] - centre
     radius = np.linalg.norm(offset, axis=1)
     shares = [share for share in FOCAL_SHARES if radius.max() / (share * size[0]) < WIDEST_RAD]
     focal = np.array(shares or [radius.max() / WIDEST_RAD / size[0]]) * size[0]
@@ -122,5 +124,5 @@ def _start(at: Array, corners_px: Array, size: tuple[int, int], use: Mask) -> Bo
     bearings = np.concatenate((offset * side[..., None], np.cos(theta)[..., None]), axis=-1)
     R, t = homography_start(points, bearings)
     maps = [BoardMap(R[i], t[i], np.array([focal[i], 0.0, *centre, 0.0, 0.0, 0.0])) for i in range(len(focal))]
-    misses = [np.sum((board(at[use]) - corners_px[use]) ** 2) for board in maps]
+    misses = [np.sum((board(at[some]) - corners_px[some]) ** 2) for board in maps]
     return maps[int(np.argmin(misses))]

@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from datasets.store import Dataset
+from datasets.schema import COMPONENTS
 from eposit.arrays import Array, Mask
 
 ERRORS = {
@@ -23,7 +23,6 @@ ERRORS = {
     "t_error_relative": "translation, relative",
     "reprojection_rmse_px": "reprojection, px",
 }
-STEEP_DEG = 45.0
 SETTING = ("solver", "points", "camera", "use")
 
 
@@ -34,6 +33,7 @@ class Series:
     name: str
     frame_id: NDArray[np.int64]
     errors: dict[str, Array]  # column to values, NaN for failures
+    normalised: Array  # (n, 6) errors over their stated standard deviations, NaN without
     failed: Mask
     star: Mask
 
@@ -47,7 +47,8 @@ def series(scores: pa.Table) -> list[Series]:
         errors = {column: part[column].to_numpy() for column in ERRORS}
         failed = np.array([status != "ok" for status in part["status"].to_pylist()])
         star = np.array(part["star"].to_pylist())
-        found.append(Series(name, part["frame_id"].to_numpy(), errors, failed, star))
+        normalised = np.stack([part[f"{component}_normalised"].to_numpy() for component in COMPONENTS], axis=1)
+        found.append(Series(name, part["frame_id"].to_numpy(), errors, normalised, failed, star))
     return found
 
 
@@ -67,38 +68,11 @@ def score_rows(found: list[Series], cameras: dict[int, str]) -> list[dict[str, A
     return rows
 
 
-def detection_rows(dataset: Dataset, frames: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Corner and circle errors for each camera, tilt up to 45 degrees and beyond."""
-    target = dataset.recipe.target
-    n = len(target.points)
-    truth, found = dataset.read("keypoints"), dataset.read("detections")
-    error = np.stack([found[f"{a}_px"].to_numpy() - truth[f"{a}_px"].to_numpy() for a in "xy"], axis=1).reshape(
-        -1, n, 2
-    )
-    ok = (found["status"].to_numpy(zero_copy_only=False) == "ok").reshape(-1, n)
-    tilt = np.array([frame["tilt_deg"] for frame in frames])
-    camera = np.array([frame["camera_name"] for frame in frames])
+def normalised_rows(found: list[Series]) -> list[dict[str, Any]]:
+    """RMS of the normalised errors of each setting that states covariances."""
     rows: list[dict[str, Any]] = []
-    for name in dict.fromkeys(camera.tolist()):
-        for label, band in ((f"up to {STEEP_DEG:g}", tilt <= STEEP_DEG), (f"beyond {STEEP_DEG:g}", tilt > STEEP_DEG)):
-            mask = (camera == name) & band
-            if not np.any(mask):
-                continue
-            corners = error[mask, : target.circle_index][ok[mask, : target.circle_index]]
-            circle = error[mask, target.circle_index][ok[mask, target.circle_index]]
-            rows.append(
-                {
-                    "camera": name,
-                    "tilt": label,
-                    "frames": int(mask.sum()),
-                    "boards": int(ok[mask, : target.circle_index].any(axis=1).sum()),
-                    "corners": len(corners),
-                    "rms": float(np.sqrt(np.mean(corners**2))) if len(corners) else np.nan,
-                    "mean_x": float(corners[:, 0].mean()) if len(corners) else np.nan,
-                    "mean_y": float(corners[:, 1].mean()) if len(corners) else np.nan,
-                    "max": float(np.linalg.norm(corners, axis=1).max()) if len(corners) else np.nan,
-                    "circles": len(circle),
-                    "circle_rms": float(np.sqrt(np.mean(circle**2))) if len(circle) else np.nan,
-                }
-            )
+    for item in found:
+        stated = item.normalised[np.all(np.isfinite(item.normalised), axis=1)]
+        if len(stated):
+            rows.append({"setting": item.name, "n": len(stated), "rms": np.sqrt(np.mean(stated**2, axis=0)).tolist()})
     return rows

@@ -8,11 +8,13 @@ from typing import Any
 import jinja2
 import numpy as np
 
+from datasets.schema import COMPONENTS
 from datasets.store import RECIPE_FILE, Dataset, refused
 from pipelines.detection import Detector
 from pipelines.doctor import versions
 from pipelines.report import figures
-from pipelines.report.data import ERRORS, detection_rows, score_rows, series
+from pipelines.report.data import ERRORS, normalised_rows, score_rows, series
+from pipelines.report.points import field_rows, point_errors, tilt_rows
 from pipelines.rows import decode_image, of_detector, points_by_frame
 from render.files import replace_atomically
 
@@ -31,11 +33,13 @@ def write_report(dataset: Dataset) -> Path:
         "time_s",
         "camera_name",
         "tilt_deg",
+        "cx_px",
+        "cy_px",
         *(f"region_{a}_px" for a in ("x", "y", "width", "height")),
     ]
     frames = dataset.read("frames", columns).to_pylist()
     by_id = {frame["frame_id"]: frame for frame in frames}
-    found = series(dataset.read("scores"))
+    found, points = series(dataset.read("scores")), point_errors(dataset, frames)
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
@@ -45,7 +49,10 @@ def write_report(dataset: Dataset) -> Path:
         recipe_text=(dataset.root / RECIPE_FILE).read_text(encoding="utf-8"),
         frames=frames,
         gallery=_gallery(dataset, frames),
-        detection=detection_rows(dataset, frames),
+        detection=tilt_rows(points, frames),
+        field=field_rows(points, frames),
+        components=COMPONENTS,
+        normalised=normalised_rows(found),
         series=[
             {"name": item.name, "helix": figures.along_helix(item, by_id), "boxes": figures.boxes(item, by_id)}
             for item in found
