@@ -21,6 +21,7 @@ ENLARGEMENT = 3.0  # the classic finder needs squares of about 10 px; tilted one
 LEAST_ENLARGEMENT, MOST_PIXELS = 1.3, 8e6  # of an enlarged region; larger ones take seconds
 CLASSIC_FLAGS = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
 SECTOR_FLAGS = cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_EXHAUSTIVE
+UNCHECKED_PIXELS = 6e5  # up to which the sector-based finder may try everything
 DECIMATION = 4  # of the picture in which texture is looked for
 REGION_MARGIN_PX = 16
 LEAST_GRADIENT = 16  # grey values between neighbours that count as texture
@@ -77,7 +78,8 @@ def _enlarged(image: Grey, inner: tuple[int, int]) -> Array | None:
 
 def _sector_based(image: Grey, inner: tuple[int, int]) -> Array | None:
     part, offset = _region_of(image)
-    if not cv2.checkChessboard(part, inner):  # the finder would take a minute for a large picture of noise
+    # The finder would take a minute for a large picture of noise; the check misses small and tilted boards.
+    if part.size > UNCHECKED_PIXELS and not cv2.checkChessboard(part, inner):
         return None
     found, corners = cv2.findChessboardCornersSB(np.ascontiguousarray(part), inner, flags=SECTOR_FLAGS)
     return corners + offset if found else None
