@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -10,7 +11,11 @@ import numpy as np
 
 from datasets.errors import UserError
 from datasets.recipe import CameraSpec, Recipe
+from datasets.scatter import MAX_TRIES, Scatter
+from datasets.trajectory import Helix
+from datasets.views import View, hand_held
 from eposit import Pose
+from render.motion import Rate
 
 
 class Stream(IntEnum):
@@ -18,6 +23,9 @@ class Stream(IntEnum):
 
     RENDER = 0  # subpixel positions, keyed by frame
     POINT_NOISE = 1  # noise on truth points, keyed by pose and draw
+    SENSOR = 2  # noise and the light's direction, keyed by frame
+    POSE = 3  # scattered poses, keyed by pose
+    HAND = 4  # rates of a hand-held board, keyed by pose
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +37,9 @@ class Frame:
     time_s: float
     camera: CameraSpec
     cam_from_obj: Pose
+    rate: Rate  # of the pose
     render_seed: int  # 32 bits
+    sensor_seed: int  # 63 bits
 
 
 def rng_for(seed: int, stream: Stream, *key: int) -> np.random.Generator:
@@ -39,26 +49,37 @@ def rng_for(seed: int, stream: Stream, *key: int) -> np.random.Generator:
 
 @functools.lru_cache(maxsize=4)
 def plan(recipe: Recipe) -> tuple[Frame, ...]:
-    """All frames, poses outermost: frame_id = pose_id * cameras + camera.
+    """All frames, poses outermost; a camera takes no part in poses beyond its `max_field_deg`.
 
     Raises:
-        UserError: a target point without an image, or outside the image unless `allow_cropped`.
+        UserError: a target point without an image, or outside the image unless `allow_cropped`; scattered poses that
+            no draw fits; a camera without any pose.
     """
     frames: list[Frame] = []
-    for pose_id, time_s in enumerate(recipe.trajectory.times()):
-        pose = recipe.trajectory.cam_from_obj(float(time_s), recipe.target)
-        for camera in recipe.cameras:
+    for pose_id, view in enumerate(_views(recipe)):
+        for camera in _planned(recipe, view.cam_from_obj):
             frame_id = len(frames)
-            seed = int(rng_for(recipe.seed, Stream.RENDER, frame_id).integers(2**32))
-            frames.append(Frame(frame_id, pose_id, float(time_s), camera, pose, seed))
+            render_seed = int(rng_for(recipe.seed, Stream.RENDER, frame_id).integers(2**32))
+            sensor_seed = int(rng_for(recipe.seed, Stream.SENSOR, frame_id).integers(2**63))
+            frames.append(
+                Frame(frame_id, pose_id, view.time_s, camera, view.cam_from_obj, view.rate, render_seed, sensor_seed)
+            )
     for frame in frames:
-        _check(frame, recipe)
+        fault = _fault(frame.camera, frame.cam_from_obj, recipe)
+        if fault:
+            raise UserError(f"frame {frame.frame_id} (camera {frame.camera.name}, t = {frame.time_s:g} s): {fault}")
+    idle = [camera for camera in recipe.cameras if camera.name not in {frame.camera.name for frame in frames}]
+    if idle:
+        raise UserError(
+            f"camera {idle[0].name} sees no pose, as max_field_deg is {idle[0].max_field_deg:g}; raise it or leave the "
+            "camera out"
+        )
     return tuple(frames)
 
 
 def frame_count(recipe: Recipe) -> int:
-    """Number of frames, without making the plan."""
-    return len(recipe.trajectory.times()) * len(recipe.cameras)
+    """Number of frames."""
+    return len(plan(recipe))
 
 
 def shard_count(recipe: Recipe) -> int:
@@ -66,20 +87,56 @@ def shard_count(recipe: Recipe) -> int:
     return -(-frame_count(recipe) // recipe.shard_frames)
 
 
-def _check(frame: Frame, recipe: Recipe) -> None:
-    camera, points = frame.camera.true_camera(), frame.cam_from_obj.apply(recipe.target.points)
-    where = f"frame {frame.frame_id} (camera {frame.camera.name}, t = {frame.time_s:g} s)"
-    position = frame.cam_from_obj.inverse().t
-    if position[2] >= -recipe.target.circle_height_mm:
-        raise UserError(f"{where}: the camera is behind the board; turn the target's front towards it")
+def _views(recipe: Recipe) -> Iterator[View]:
+    path, target = recipe.trajectory, recipe.target
+    if isinstance(path, Helix):
+        for time_s in path.times():
+            yield path.view(float(time_s), target)
+        return
+    poses = _scattered(path, recipe) if isinstance(path, Scatter) else path.poses(target)
+    for pose_id, pose in enumerate(poses):
+        rng = rng_for(recipe.seed, Stream.HAND, pose_id)
+        yield View(float(pose_id), pose, hand_held(pose, target, path.speed_mm_per_s, path.turn_deg_per_s, rng))
+
+
+def _scattered(path: Scatter, recipe: Recipe) -> Iterator[Pose]:
+    def fits(pose: Pose) -> bool:
+        cameras = _planned(recipe, pose)
+        return bool(cameras) and all(_fault(camera, pose, recipe) is None for camera in cameras)
+
+    for pose_id in range(path.count):
+        rng = rng_for(recipe.seed, Stream.POSE, pose_id)
+        pose = path.pose(rng, recipe.target, recipe.cameras[0].true_camera(), fits)
+        if pose is None:
+            raise UserError(
+                f"pose {pose_id}: none of {MAX_TRIES} random poses has the whole target in every camera; increase "
+                "depth_range_mm, or narrow offset_range_mm and tilt_range_deg"
+            )
+        yield pose
+
+
+def _planned(recipe: Recipe, pose: Pose) -> list[CameraSpec]:
+    """The cameras whose `max_field_deg` the board's centre does not pass."""
+    x, y, z = pose.apply(recipe.target.board_centre[None])[0]
+    field = np.degrees(np.arctan2(np.hypot(x, y), z)) - 1e-9  # a limit that is met is not passed
+    return [camera for camera in recipe.cameras if camera.max_field_deg is None or field <= camera.max_field_deg]
+
+
+def _fault(spec: CameraSpec, pose: Pose, recipe: Recipe) -> str | None:
+    """What is wrong with a pose in front of a camera, with the remedy; None if nothing."""
+    camera, points = spec.true_camera(), pose.apply(recipe.target.points)
+    if pose.inverse().t[2] >= -recipe.target.circle_height_mm:
+        return "the camera is behind the board; turn the target's front towards it"
     projected = camera.project(points)
     unseen = int(np.sum(np.isnan(projected).any(axis=1)))
-    if unseen:
-        raise UserError(
-            f"{where}: {unseen} of {len(points)} target points are behind the camera or beyond the lens; "
-            "move the target in front of it"
+    if unseen == len(points) or (unseen and not recipe.allow_cropped):
+        remedy = "" if unseen == len(points) else ", or set allow_cropped = true"
+        return (
+            f"{unseen} of {len(points)} target points are behind the camera or beyond the lens; "
+            f"move the target in front of it{remedy}"
         )
     outside = int(np.sum(~camera.contains(projected)))
     if outside == len(points) or (outside and not recipe.allow_cropped):
         remedy = "move the target" if outside == len(points) else "move the target, or set allow_cropped = true"
-        raise UserError(f"{where}: {outside} of {len(points)} target points lie outside the image; {remedy}")
+        return f"{outside} of {len(points)} target points lie outside the image; {remedy}"
+    return None

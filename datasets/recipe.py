@@ -7,69 +7,24 @@ import hashlib
 import json
 import tomllib
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, fields, is_dataclass
+from dataclasses import asdict
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, get_args, get_type_hints
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
+from datasets.cameras import CameraSpec
+from datasets.cameras import assumed_camera as assumed_camera
 from datasets.errors import UserError
-from datasets.trajectory import Trajectory
-from eposit import Camera
-from eposit.lens import LENS_NAMES
-from render.develop import SensorModel
+from datasets.keys import Key, keys_of, sentence, values_of
+from datasets.trajectory import TRAJECTORIES, Helix, Trajectory
 from render.light import Light
+from render.regimes import DEFAULT_REGIME, SensorModel, regimes
 from render.target import CIRCLE, Target
 
 RECIPES = resources.files("datasets") / "recipes"
 SUFFIX = ".toml"
-MAX_PIXELS = 100_000_000
-LEAST_FOCAL_PX, MOST_FOCAL_PX = 1.0, 1e6
-UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")  # Pydantic's types of fault
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CameraSpec:
-    """One camera of a recipe: the true one, which renders, and what a user without calibration would assume."""
-
-    name: Annotated[str, "name in tables and on pictures"]
-    lens: Annotated[str, "lens law: " + ", ".join(LENS_NAMES)]
-    fx: Annotated[float, "true focal length along x, px"]
-    fy: Annotated[float, "true focal length along y, px"]
-    cx: Annotated[float, "true principal point, px"]
-    cy: Annotated[float, "true principal point, px"]
-    width: Annotated[int, "image width, px"] = 1600
-    height: Annotated[int, "image height, px"] = 1200
-    coefficients: Annotated[tuple[float, ...], "k1 to k4 of kannala_brandt; empty for the other lenses"] = ()
-    nominal_f: Annotated[float | None, "nominal focal length, px; the mean of fx and fy if left out"] = None
-
-    def __post_init__(self) -> None:
-        if not (LEAST_FOCAL_PX <= self.fx <= MOST_FOCAL_PX and LEAST_FOCAL_PX <= self.fy <= MOST_FOCAL_PX):
-            allowed = f"{LEAST_FOCAL_PX:g} to {MOST_FOCAL_PX:g} px"
-            raise ValueError(f"camera {self.name!r} has fx {self.fx} and fy {self.fy}; both must lie in {allowed}")
-        if self.width * self.height > MAX_PIXELS:
-            raise ValueError(f"camera {self.name!r} has {self.width} x {self.height} pixels; at most {MAX_PIXELS} work")
-        if self.nominal_f is not None and not self.nominal_f > 0.0:
-            raise ValueError(f"camera {self.name!r} has nominal_f {self.nominal_f}; it must be above 0 px")
-        self.true_camera()
-
-    def true_camera(self) -> Camera:
-        """The camera that renders."""
-        return Camera(
-            lens=self.lens, fx=self.fx, fy=self.fy, cx=self.cx, cy=self.cy,
-            width=self.width, height=self.height, coefficients=self.coefficients,
-        )  # fmt: skip
-
-    def nominal_camera(self) -> Camera:
-        """Nominal focal length on both axes and the image centre as the principal point."""
-        f = 0.5 * (self.fx + self.fy) if self.nominal_f is None else self.nominal_f
-        return assumed_camera(self.true_camera(), f)
-
-
-def assumed_camera(true: Camera, nominal_f: float) -> Camera:
-    """What a user without calibration assumes: the nominal focal length, px, and the image centre."""
-    return true.replace(fx=nominal_f, fy=nominal_f, cx=true.width / 2.0, cy=true.height / 2.0)
 
 
 class Recipe(BaseModel):
@@ -93,7 +48,7 @@ class Recipe(BaseModel):
     target: Annotated[Target, Field(description="the board and its circle")] = Target()
     light: Annotated[Light, Field(description="lamp, surrounding, background")] = Light()
     sensor: Annotated[SensorModel, Field(description="linear light to 8 bits")] = SensorModel()
-    trajectory: Annotated[Trajectory, Field(description="the target's path")] = Trajectory()
+    trajectory: Annotated[Trajectory, Field(discriminator="kind", description="the target's path")] = Helix()
     cameras: Annotated[tuple[CameraSpec, ...], Field(min_length=1, description="the cameras; each sees every pose")]
 
     @field_validator("samples")
@@ -137,15 +92,32 @@ def parse_recipe(text: str, source: str) -> Recipe:
         UserError: not TOML, an unknown key (with the nearest known one), a wrong type or a value out of range.
     """
     try:
-        return Recipe.model_validate_json(json.dumps(tomllib.loads(text)))
+        return Recipe.model_validate_json(json.dumps(_completed(tomllib.loads(text), source)))
+    except UserError:
+        raise
     except tomllib.TOMLDecodeError as error:
         raise UserError(f"{source} is not valid TOML: {error}; mend that line") from None
     except (TypeError, ValueError) as error:
         if isinstance(error, ValidationError):
-            raise UserError(f"{source}: {_sentence(error)}") from None
+            raise UserError(f"{source}: {sentence(error, Recipe)}") from None
         raise UserError(
             f"{source} holds a value that a recipe cannot take: {error}; use numbers, texts and lists"
         ) from None
+
+
+def _completed(data: dict[str, Any], source: str) -> dict[str, Any]:
+    """A recipe's data with the trajectory's kind and the values of the sensor's regime."""
+    path, sensor = data.get("trajectory"), data.get("sensor")
+    if isinstance(path, dict):
+        kind = path.setdefault("kind", "helix")
+        if kind not in list(TRAJECTORIES):
+            raise UserError(f"{source}: trajectory kind is {kind!r}; choose one of {', '.join(TRAJECTORIES)}")
+    if isinstance(sensor, dict):
+        regime = sensor.pop("regime", DEFAULT_REGIME)
+        if regime not in list(regimes()):
+            raise UserError(f"{source}: sensor regime is {regime!r}; choose one of {', '.join(regimes())}")
+        data["sensor"] = asdict(regimes()[regime]) | sensor
+    return data
 
 
 def load_recipe(name: str) -> tuple[Recipe, str]:
@@ -174,84 +146,15 @@ def recipe_names() -> list[str]:
     return sorted(path.name.removesuffix(SUFFIX) for path in RECIPES.iterdir() if path.name.endswith(SUFFIX))
 
 
-def describe(model: type[Any] = Recipe, prefix: str = "") -> Iterator[tuple[str, str, str]]:
+def describe() -> Iterator[Key]:
     """Key, default and meaning of every key of a recipe, from the same fields that validate it."""
-    if issubclass(model, BaseModel):
-        for name, info in model.model_fields.items():
-            nested = next((kind for kind in (info.annotation, *get_args(info.annotation)) if is_dataclass(kind)), None)
-            default = "required" if info.is_required() else _toml(info.default)
-            yield f"{prefix}{name}", "section" if nested else default, info.description or ""
-            if isinstance(nested, type):
-                yield from describe(nested, f"{prefix}{name}.")
-        return
-    hints = get_type_hints(model, include_extras=True)
-    instance = None if model is CameraSpec else model()
-    for field in fields(model):
-        meaning = hints[field.name].__metadata__[0]
-        default = _toml(getattr(instance, field.name)) if instance else _field_default(field)
-        yield f"{prefix}{field.name}", default, meaning
+    return keys_of(Recipe)
 
 
 def values(recipe: Recipe) -> dict[str, str]:
-    """Key to value for every key of `describe`; those of the cameras are lists over the cameras."""
-    found: dict[str, str] = {}
-    for key, _, _ in describe():
-        head, _, tail = key.partition(".")
-        value = getattr(recipe, head)
-        if head == "cameras":
-            found[key] = (
-                ", ".join(_toml(getattr(camera, tail)) for camera in value) if tail else f"{len(value)} cameras"
-            )
-        else:
-            found[key] = _toml(getattr(value, tail)) if tail else "section" if is_dataclass(value) else _toml(value)
-    return found
-
-
-def _field_default(field: Any) -> str:
-    from dataclasses import MISSING
-
-    return "required" if field.default is MISSING else _toml(field.default)
-
-
-def _toml(value: Any) -> str:
-    if is_dataclass(value) and not isinstance(value, type):
-        return json.dumps(asdict(value))
-    return "none" if value is None else json.dumps(value)
+    """Key to value for every key of `describe` that the recipe takes."""
+    return values_of(recipe)
 
 
 def _known() -> str:
     return ", ".join(recipe_names())
-
-
-def _sentence(error: ValidationError) -> str:
-    """The first fault of a validation as one sentence with the key's path."""
-    # A misspelt key is missing under its right name as well: what is unknown comes first.
-    first = min(error.errors(include_url=False), key=lambda fault: fault["type"] not in UNKNOWN_KEY)
-    path = [
-        str(part) for part in first["loc"] if not (isinstance(part, str) and part.startswith(("tuple[", "literal[")))
-    ]
-    key = ".".join(path) or "recipe"
-    kind, given = first["type"], first.get("input")
-    if kind in UNKNOWN_KEY:
-        known = _keys_beside(path)
-        close = difflib.get_close_matches(path[-1], known, n=1)
-        hint = f" (did you mean {close[0]!r}?)" if close else ""
-        return f"unknown key {key!r}{hint}; known keys there are {', '.join(known)}"
-    if kind in ("missing", "missing_argument", "missing_keyword_only_argument"):
-        return f"key {key!r} is missing; add it"
-    if kind == "value_error":
-        return str(first.get("ctx", {}).get("error", first["msg"]))
-    meaning = next((text for name, _, text in describe() if name == ".".join(p for p in path if not p.isdigit())), "")
-    return f"key {key!r} is {_short(given)} ({first['msg'][:1].lower()}{first['msg'][1:]}); it takes: {meaning}"
-
-
-def _keys_beside(path: list[str]) -> list[str]:
-    parents = [part for part in path[:-1] if not part.isdigit()]
-    prefix = ".".join(parents)
-    keys = [key for key, _, _ in describe()]
-    return [key.rpartition(".")[2] for key in keys if key.rpartition(".")[0] == prefix]
-
-
-def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."

@@ -38,7 +38,7 @@ FRAMES = pa.schema(
     [
         _field("frame_id", pa.int64(), "frame, from 0"),
         _field("pose_id", pa.int64(), "pose; frames of one pose differ by camera only"),
-        _field("time_s", pa.float64(), "time on the trajectory"),
+        _field("time_s", pa.float64(), "time on the trajectory; the number of the pose where it has no time"),
         _field("camera_name", pa.string(), "camera's name in the recipe"),
         _field("lens", pa.string(), "lens law"),
         _field("image", _IMAGE, "8-bit grey PNG"),
@@ -63,6 +63,7 @@ FRAMES = pa.schema(
             ("region_height_px", "height of the rendered region"),
         )),
         _field("render_seed", pa.int64(), "seed of the subpixel positions"),
+        _field("sensor_seed", pa.int64(), "seed of the noise and of the light's direction"),
         _field("master", pa.string(), "path of the linear-light EXR within the dataset"),
     ]
 )  # fmt: skip
@@ -76,8 +77,8 @@ KEYPOINTS = pa.schema(
                 "x_obj_mm": "x in the object frame",
                 "y_obj_mm": "y in the object frame",
                 "z_obj_mm": "z in the object frame, into the board",
-                "x_px": "true image of the point",
-                "y_px": "true image of the point",
+                "x_px": "true image of the point; NaN beyond the lens",
+                "y_px": "true image of the point; NaN beyond the lens",
                 "x_outline_px": "centroid of the projected outline: of the circle; a corner's is the corner",
                 "y_outline_px": "centroid of the projected outline: of the circle; a corner's is the corner",
                 "theta_deg": "incidence angle",

@@ -1,4 +1,4 @@
-"""The path of the target in front of the camera: the paper's cylindrical helix."""
+"""Where the target stands in front of the camera: the paper's helix, chosen field angles, or scattered poses."""
 
 from __future__ import annotations
 
@@ -7,14 +7,19 @@ from typing import Annotated, Literal
 
 import numpy as np
 
+from datasets.scatter import Scatter
+from datasets.views import FieldAngles, View
 from eposit import Pose
 from eposit.arrays import Array
-from eposit.pose import rotation_from_euler
+from eposit.pose import rotation_error_vector, rotation_from_euler
+from render.motion import Rate
 from render.target import Target
+
+HALF_STEP_S = 0.005  # of the helix's central difference: rounding and curvature both stay below 1e-9 of the rate
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Trajectory:
+class Helix:
     """A helix about the optical axis while the target turns evenly about all three axes of the camera.
 
     X = radius cos(phase + t), Y = radius sin(phase + t), Z = depth + depth_rate t, with t in degrees and in seconds
@@ -26,6 +31,7 @@ class Trajectory:
         Paper, section III. The start angles and the range of t are not in its text; they are inferred from its code.
     """
 
+    kind: Annotated[Literal["helix"], "helix, field or scatter"] = "helix"
     point: Annotated[
         Literal["board_centre", "origin"] | tuple[float, float, float],
         "point of the target that the helix carries: board_centre, origin, or [x, y, z] in mm",
@@ -60,7 +66,18 @@ class Trajectory:
         carried = np.array([self.radius_mm * np.cos(angle), self.radius_mm * np.sin(angle), depth])
         return Pose(R, carried - R @ self._point_in_obj(target))
 
+    def view(self, time_s: float, target: Target) -> View:
+        """Pose and rate at a time, the rate by a central difference."""
+        before, after = (self.cam_from_obj(time_s + s * HALF_STEP_S, target) for s in (-1.0, 1.0))
+        turn = rotation_error_vector(after.R, before.R)
+        rate = Rate((after.t - before.t) / (2.0 * HALF_STEP_S), turn / (2.0 * HALF_STEP_S))
+        return View(time_s, self.cam_from_obj(time_s, target), rate)
+
     def _point_in_obj(self, target: Target) -> Array:
         if self.point == "board_centre":
             return target.board_centre
         return np.zeros(3) if self.point == "origin" else np.array(self.point)
+
+
+Trajectory = Helix | FieldAngles | Scatter
+TRAJECTORIES: dict[str, type[Trajectory]] = {"helix": Helix, "field": FieldAngles, "scatter": Scatter}

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from datasets.errors import UserError
@@ -20,6 +21,12 @@ Folder = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a dataset
 RecipeName = Annotated[str, typer.Argument(metavar="RECIPE", help="A .toml file, or a name from `recipes`.")]
 Workers = Annotated[int, typer.Option(help="Processes; the result is the same for any number.")]
 DetectorName = Annotated[str, typer.Option("--detector", help="edge-fit (ours), opencv-subpix or opencv-sb.")]
+Regime = Annotated[
+    str | None, typer.Option(help="Sensor regime, as if the recipe said so: clean, typical, paper or harsh.")
+]
+Masters = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Dataset whose linear light is taken where it shows the same views.")
+]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars.")]
 
 app = typer.Typer(
@@ -34,12 +41,19 @@ app = typer.Typer(
 
 
 @app.command(epilog="Example: python -m pipelines run demo --out out/demo")
-def run(recipe: RecipeName, out: Out, workers: Workers = 1, quiet: Quiet = False) -> None:
+def run(
+    recipe: RecipeName,
+    out: Out,
+    regime: Regime = None,
+    masters: Masters = None,
+    workers: Workers = 1,
+    quiet: Quiet = False,
+) -> None:
     """Every stage: generate, detect, estimate, score, report."""
     from pipelines import stages
 
     console = Console(quiet=quiet)
-    dataset = _claim(recipe, out)
+    dataset = _claim(recipe, out, regime, masters, console)
     stages.run_generate(dataset, workers, console)
     stages.run_detect(dataset, workers, console)
     stages.run_estimate(dataset, stages.RUN_SETTINGS, workers, console)
@@ -48,11 +62,19 @@ def run(recipe: RecipeName, out: Out, workers: Workers = 1, quiet: Quiet = False
 
 
 @app.command(epilog="Example: python -m pipelines generate demo --out out/demo")
-def generate(recipe: RecipeName, out: Out, workers: Workers = 1, quiet: Quiet = False) -> None:
+def generate(
+    recipe: RecipeName,
+    out: Out,
+    regime: Regime = None,
+    masters: Masters = None,
+    workers: Workers = 1,
+    quiet: Quiet = False,
+) -> None:
     """Render images with their truth."""
     from pipelines import stages
 
-    stages.run_generate(_claim(recipe, out), workers, Console(quiet=quiet))
+    console = Console(quiet=quiet)
+    stages.run_generate(_claim(recipe, out, regime, masters, console), workers, console)
 
 
 @app.command(epilog="Example: python -m pipelines detect out/demo --detector opencv-subpix")
@@ -103,9 +125,9 @@ def report(folder: Folder) -> None:
 
 
 @app.command(epilog="Example: python -m pipelines demo --out out/demo")
-def demo(out: Out = Path("out/demo"), workers: Workers = 1, quiet: Quiet = False) -> None:
+def demo(out: Out = Path("out/demo"), regime: Regime = None, workers: Workers = 1, quiet: Quiet = False) -> None:
     """Run the recipe `demo`: 40 images, five lenses, a report."""
-    run("demo", out, workers, quiet)
+    run("demo", out, regime=regime, workers=workers, quiet=quiet)
 
 
 @app.command(epilog="Example: python -m pipelines verify out/demo")
@@ -173,27 +195,50 @@ def recipes() -> None:
 def describe(
     recipe: Annotated[str | None, typer.Argument(metavar="[RECIPE]", help="Show its values beside the keys.")] = None,
 ) -> None:
-    """Every key of a recipe: default or value, and meaning."""
+    """Every key of a recipe with its meaning: its defaults and the sensor's regimes, or a recipe's values."""
     from datasets.recipe import describe as keys
     from datasets.recipe import load_recipe, values
+    from render.regimes import regime_rows, regimes
 
-    given = values(load_recipe(recipe)[0]) if recipe else {}
+    rows = [(key, default, meaning) for key, default, meaning in keys()]
+    if recipe:
+        given = values(load_recipe(recipe)[0])
+        rows = [(key, given[key], meaning) for key, _, meaning in rows if key in given]
+    _print_table(("key", "value" if recipe else "default", "meaning"), rows)
+    if not recipe:
+        typer.echo("\nThe sensor's regimes:\n")
+        _print_table(("key", *regimes()), [(f"sensor.{key}", *map(str, row)) for key, row in regime_rows()])
+
+
+def _print_table(titles: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
     table = Table(box=None)
-    for title in ("key", "value" if recipe else "default", "meaning"):
+    for title in titles:
         table.add_column(title, overflow="fold")
-    for key, default, meaning in keys():
-        table.add_row(key, given.get(key, default), meaning)
+    for row in rows:
+        table.add_row(*map(escape, row))
     Console().print(table)
 
 
-def _claim(recipe: str, out: Path) -> Any:
+def _claim(recipe: str, out: Path, regime: str | None, masters: Path | None, console: Console) -> Any:
+    from datasets.override import with_regime
     from datasets.plan import plan
-    from datasets.recipe import load_recipe
-    from datasets.store import claim
+    from datasets.recipe import load_recipe, parse_recipe
+    from datasets.store import claim, open_dataset
 
     loaded, text = load_recipe(recipe)
+    if regime is not None:
+        text = with_regime(text, regime, recipe)
+        loaded = parse_recipe(text, f"recipe {recipe} with --regime {regime}")
     plan(loaded)
-    return claim(out, loaded, text)
+    if masters is not None:
+        open_dataset(masters)  # before anything is written
+    dataset = claim(out, loaded, text)
+    if masters is not None:
+        from pipelines.borrow import borrow_masters
+
+        taken, lacking = borrow_masters(dataset, masters)
+        console.print(f"masters: {taken} of {lacking} taken from {masters}; the rest is rendered")
+    return dataset
 
 
 def _open(folder: Path) -> Any:

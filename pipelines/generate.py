@@ -18,7 +18,7 @@ from datasets.schema import FRAMES, KEYPOINTS
 from datasets.store import MASTERS, Dataset, refused
 from eposit.pose import tilt_rad
 from pipelines.rows import pose_columns, table
-from render.develop import develop, encode_png
+from render.develop import Shot, develop, encode_png
 from render.master import Master, MasterError, read_master, render_master, write_master
 
 
@@ -48,7 +48,8 @@ def _frame_row(dataset: Dataset, frame: Frame) -> dict[str, object]:
     recipe, spec = dataset.recipe, frame.camera
     camera = spec.true_camera()
     master, path = _master(dataset, frame)
-    image = develop(master.full(camera), recipe.sensor)
+    shot = Shot(recipe.target, camera, frame.cam_from_obj, frame.rate, master.region, frame.sensor_seed)
+    image = develop(master.full(camera), recipe.sensor, shot)
     coefficients = np.zeros(4)
     coefficients[: len(spec.coefficients)] = spec.coefficients
     region = dict(
@@ -73,6 +74,7 @@ def _frame_row(dataset: Dataset, frame: Frame) -> dict[str, object]:
         "height_px": spec.height,
         **region,
         "render_seed": frame.render_seed,
+        "sensor_seed": frame.sensor_seed,
         "master": path,
     }
 

@@ -1,0 +1,57 @@
+"""What a lens does to light besides its projection: the disc of defocus and the loss towards the corners."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eposit.arrays import Array
+
+
+@functools.lru_cache(maxsize=4)
+def disc_kernel(radius: float) -> NDArray[np.float32]:
+    """(2 k + 1, 2 k + 1) share of a disc's area in each pixel, exact; the disc lies on the middle of the middle pixel.
+
+    radius: px, above 0.
+    """
+    reach = int(np.ceil(radius - 0.5)) if radius > 0.5 else 0
+    border = np.arange(-reach, reach + 2) - 0.5
+    area = _quarter_plane_area(np.clip(border / radius, -1.0, 1.0))
+    shares = np.diff(np.diff(area, axis=0), axis=1)
+    return (shares / shares.sum()).astype(np.float32)
+
+
+def _quarter_plane_area(at: Array) -> Array:
+    """(n, n) area of the unit disc where x <= at[i] and y <= at[j], each in [-1, 1]."""
+    a, b = np.meshgrid(at, at, indexing="ij")
+
+    def below(x: Array) -> Array:
+        """Integral of sqrt(1 - x^2) from -1."""
+        return 0.5 * (x * np.sqrt(np.maximum(0.0, 1.0 - x * x)) + np.arcsin(x)) + 0.25 * np.pi
+
+    # At x the disc spans y from -s to s, s = sqrt(1 - x^2); below y = b that is s + min(b, s) or, for b < -s, nothing.
+    half = np.sqrt(np.maximum(0.0, 1.0 - b * b))  # |x| up to which the line y = b lies inside the disc
+    inner = np.clip(a, -half, half)
+    across = below(inner) - below(-half) + b * (inner + half)  # where it does
+    beyond = 2.0 * (below(np.minimum(a, -half)) + below(np.maximum(a, half)) - below(half))  # where b > s: all of it
+    return across + np.where(b > 0.0, beyond, 0.0)
+
+
+@functools.lru_cache(maxsize=4)
+def vignetting_gain(width: int, height: int, loss: float) -> NDArray[np.float32]:
+    """(height, width) share of light that arrives: 1 in the picture's middle, 1 - loss in its corners.
+
+    1 / (1 + k (r / corner)^2)^2, the cos^4 law of a lens that sees its corner at the tangent sqrt k.
+    """
+    k = 1.0 / np.sqrt(1.0 - loss) - 1.0
+    x, y = from_middle(width, height)
+    return (1.0 / (1.0 + k * (x[None] ** 2 + y[:, None] ** 2)) ** 2).astype(np.float32)
+
+
+def from_middle(width: int, height: int) -> tuple[Array, Array]:
+    """(width,) and (height,) places of the pixels from the picture's middle, in units of the way to a corner pixel."""
+    x, y = np.arange(width) - 0.5 * (width - 1), np.arange(height) - 0.5 * (height - 1)
+    corner = max(np.hypot(x[-1], y[-1]), 1.0)
+    return x / corner, y / corner
