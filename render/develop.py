@@ -13,14 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eposit import Camera, Pose
+from eposit.arrays import Array
 from render.master import Image, Region
-from render.motion import Rate, displacement
+from render.motion import Rate, at_pixels, way_at_nodes
+from render.noise import electron_noise
 from render.optics import disc_kernel, from_middle, vignetting_gain
 from render.regimes import SensorModel
 from render.target import Target
 
 MAX_GREY = 255.0
-LEAST_MOTION_PX = 0.2  # a way below this would widen a point spread of 0.7 px by less than 0.3 percent
+LEAST_MOTION_PX = 0.05  # a way below this would widen a point spread of 0.7 px by less than 0.03 percent
+SHORT_PX = 0.5  # up to here nine weights with the right moments are within half a grey level of the even way
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,30 +46,34 @@ def develop(radiance: Image, model: SensorModel, shot: Shot | None = None) -> ND
     Raises:
         ValueError: such a model without a frame.
     """
-    if shot is None:
-        if model.needs_frame:
-            raise ValueError("the sensor model has noise, motion or uneven light; give the frame as `shot`")
-        return _digitise(_spread(_vignetted(radiance, model), model) * np.float32(model.exposure), model)
-    rng = np.random.Generator(np.random.SFC64(shot.seed))
-    light = _spread(_unevenly_lit(_vignetted(radiance, model), model, rng), model)
-    if model.exposure_s > 0.0:
+    bits = None if shot is None else np.random.SFC64(shot.seed)
+    if bits is None and model.needs_frame:
+        raise ValueError("the sensor model has noise, motion or uneven light; give the frame as `shot`")
+    light = _spread(_lit(radiance, model, bits), model)
+    if shot is not None and model.exposure_s > 0.0:
         light = _moved(light, model, shot)
-    return _digitise(_noisy(light * np.float32(model.exposure), model, rng), model)
+    linear = light * np.float32(model.exposure)
+    if bits is not None and model.full_well_e > 0.0:
+        linear += electron_noise(linear, model.full_well_e, model.read_noise_e, bits)
+    return _digitise(linear, model)
 
 
-def _vignetted(light: Image, model: SensorModel) -> Image:
-    return light * vignetting_gain(*light.shape[::-1], model.vignetting) if model.vignetting > 0.0 else light
+def _lit(radiance: Image, model: SensorModel, bits: np.random.SFC64 | None) -> Image:
+    """Light as it falls and as the lens lets it through.
 
-
-def _unevenly_lit(light: Image, model: SensorModel, rng: np.random.Generator) -> Image:
-    """A plane over the picture, 1 in its middle and 1 +- uneven in the corners if it falls along the diagonal."""
-    direction = rng.uniform(0.0, 2.0 * np.pi)
+    The uneven light is a plane over the picture, 1 in its middle and 1 +- uneven in the corners that it falls towards.
+    """
+    size = radiance.shape[::-1]
+    direction = 0.0 if bits is None else 2.0 * np.pi * int(bits.random_raw()) / 2.0**64
     if model.uneven == 0.0:
-        return light
-    x, y = from_middle(*light.shape[::-1])
+        return radiance * vignetting_gain(*size, model.vignetting) if model.vignetting > 0.0 else radiance
+    x, y = from_middle(*size)
     across = (1.0 + model.uneven * np.cos(direction) * x).astype(np.float32)
-    down = (model.uneven * np.sin(direction) * y).astype(np.float32)
-    return light * np.add.outer(down, across)
+    gain = np.add.outer((model.uneven * np.sin(direction) * y).astype(np.float32), across)
+    if model.vignetting > 0.0:
+        gain *= vignetting_gain(*size, model.vignetting)
+    gain *= radiance
+    return gain
 
 
 def _spread(light: Image, model: SensorModel) -> Image:
@@ -85,30 +92,56 @@ def _moved(light: Image, model: SensorModel, shot: Shot) -> Image:
     """The mean over the exposure of the light around the board, which moves with it.
 
     The lens's spread comes first, though the light moves before: over its few pixels the motion is the same, so the
-    order does not matter, and spread light can be interpolated (Lanczos, 8 x 8 pixels) with next to no further blur.
-    The moments are those of Gauss and Legendre, symmetric about mid-exposure: nothing moves in the mean.
+    order does not matter, and spread light can be interpolated with next to no further blur.
     """
     moving = (shot.target, shot.camera, shot.cam_from_obj, shot.rate, model.exposure_s)
-    reach = _longest(displacement(*moving, shot.region))
+    reach = _longest(way_at_nodes(*moving, shot.region))
     if reach < LEAST_MOTION_PX:
         return light
     spread = model.defocus_radius_px + 5.0 * model.psf_sigma_px
-    x, y, width, height = _grown(shot.region, int(np.ceil(reach + spread)), light.shape)
-    way = displacement(*moving, (x, y, width, height))
-    here = np.stack(np.meshgrid(np.arange(x, x + width), np.arange(y, y + height)), axis=-1).astype(np.float32)
-    moments, weights = np.polynomial.legendre.leggauss(2 + int(np.ceil(_longest(way))))
-    total = np.zeros((height, width), np.float32)
-    for moment, weight in zip(moments, weights, strict=True):
-        there = here - np.float32(0.5 * moment) * way
-        then = cv2.remap(light, there, None, cv2.INTER_LANCZOS4, borderMode=cv2.BORDER_REPLICATE)  # pyright: ignore
+    region = _grown(shot.region, int(np.ceil(reach + spread)), light.shape)
+    nodes = way_at_nodes(*moving, region)
+    x, y, width, height = region
+    way_x, way_y = at_pixels(nodes, width, height)
+    part = light[y : y + height, x : x + width]
+    reach, moved = _longest(nodes), light.copy()
+    moved[y : y + height, x : x + width] = (
+        _short_way(part, way_x, way_y) if reach <= SHORT_PX else _long_way(part, way_x, way_y, reach)
+    )
+    return moved
+
+
+def _short_way(part: Image, way_x: Image, way_y: Image) -> Image:
+    """Blur by nine weights with the moments of an even way: mean 0, variance way^2 / 12."""
+    kernels = (
+        (way_x * way_x, [[0, 0, 0], [1, -2, 1], [0, 0, 0]]),
+        (way_y * way_y, [[0, 1, 0], [0, -2, 0], [0, 1, 0]]),
+        (way_x * way_y, [[0.5, 0, -0.5], [0, 0, 0], [-0.5, 0, 0.5]]),
+    )
+    total = part.copy()
+    for variance, bend in kernels:
+        kernel = np.array(bend, np.float32) / np.float32(24.0)
+        total += variance * cv2.filter2D(part, -1, kernel, borderType=cv2.BORDER_REPLICATE)
+    return total
+
+
+def _long_way(part: Image, way_x: Image, way_y: Image, reach: float) -> Image:
+    """The mean of the light at the moments of Gauss and Legendre, which lie symmetrically about mid-exposure.
+
+    They are at most 0.7 px apart or so, interpolated by Lanczos over 8 x 8 pixels.
+    """
+    columns, rows = np.arange(part.shape[1], dtype=np.float32), np.arange(part.shape[0], dtype=np.float32)[:, None]
+    total = np.zeros_like(part)
+    for moment, weight in zip(*np.polynomial.legendre.leggauss(1 + int(np.ceil(reach / 0.7))), strict=True):
+        back = np.float32(-0.5 * moment)
+        there = columns + back * way_x, rows + back * way_y
+        then = cv2.remap(part, *there, cv2.INTER_LANCZOS4, borderMode=cv2.BORDER_REPLICATE)
         total += np.float32(0.5 * weight) * then
-    blurred = light.copy()
-    blurred[y : y + height, x : x + width] = total
-    return blurred
+    return total
 
 
-def _longest(way: Image) -> float:
-    return float(np.sqrt(np.max(np.sum(way * way, axis=-1))))
+def _longest(nodes: Array) -> float:
+    return float(np.max(np.hypot(nodes[..., 0], nodes[..., 1])))
 
 
 def _grown(region: Region, margin: int, shape: tuple[int, ...]) -> Region:
@@ -118,34 +151,25 @@ def _grown(region: Region, margin: int, shape: tuple[int, ...]) -> Region:
     return low[0], low[1], high[0] - low[0], high[1] - low[1]
 
 
-def _noisy(linear: Image, model: SensorModel, rng: np.random.Generator) -> Image:
-    """Shot and read noise on light as a share of full scale.
-
-    Both together as one gaussian with the right mean and variance. Above twenty electrons that is all that can be
-    told of Poisson's law; below, its skewness is lost, and the read noise covers it.
-    """
-    if model.full_well_e == 0.0:
-        return linear
-    well = np.float32(model.full_well_e)
-    variance = np.maximum(linear, np.float32(0.0))
-    variance *= np.float32(1.0) / well
-    variance += np.float32((model.read_noise_e / model.full_well_e) ** 2)
-    noise = rng.standard_normal(linear.shape, dtype=np.float32)
-    noise *= np.sqrt(variance, out=variance)
-    noise += linear
-    return noise
-
-
 def _digitise(linear: Image, model: SensorModel) -> NDArray[np.uint8]:
-    linear = np.clip(linear, 0.0, 1.0)
-    encoded = linear if model.gamma == 1.0 else linear ** np.float32(1.0 / model.gamma)
-    return np.rint(encoded * np.float32(MAX_GREY)).astype(np.uint8)
+    """Clip, curve and round, in the memory of `linear`."""
+    np.clip(linear, 0.0, 1.0, out=linear)
+    if model.gamma != 1.0:
+        np.power(linear, np.float32(1.0 / model.gamma), out=linear)
+    linear *= np.float32(MAX_GREY)
+    return np.rint(linear, out=linear).astype(np.uint8)
 
 
 def encode_png(image: NDArray[np.uint8]) -> bytes:
     """PNG bytes of an 8-bit grey image."""
-    _, encoded = cv2.imencode(".png", image, [cv2.IMWRITE_PNG_COMPRESSION, 3])
-    return encoded.tobytes()
+    # Differences of rows, their runs and Huffman's code, without a search for longer repeats: noise has none. The
+    # order counts: OpenCV's compression level sets the strategy too.
+    settings = [
+        *(cv2.IMWRITE_PNG_COMPRESSION, 1),
+        *(cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE),
+        *(cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_UP),
+    ]
+    return cv2.imencode(".png", image, settings)[1].tobytes()
 
 
 def decode_png(data: bytes) -> NDArray[np.uint8]:

@@ -35,21 +35,29 @@ class Rate:
         return Rate(velocity_mm_per_s + np.cross(turn_rad_per_s, arm), turn_rad_per_s)
 
 
-def displacement(
+def way_at_nodes(
     target: Target, camera: Camera, cam_from_obj: Pose, rate: Rate, seconds: float, region: Region
-) -> NDArray[np.float32]:
-    """(height, width, 2) way in px that each pixel of the region goes during an exposure, mid-exposure at its middle.
+) -> Array:
+    """(rows, columns, 2) way in px that pixels go during an exposure, mid-exposure at its middle.
 
-    A pixel moves as the point of the board's plane that it shows; beyond the board's border as the nearest point of
-    the border. It is a central difference, so that the way there and the way back are equally long.
+    Every STEP_PX-th pixel of the region, from its first to beyond its last. A pixel moves as the point of the board's
+    plane that it shows; beyond the board's border as the nearest point of the border. It is a central difference, so
+    that the way there and the way back are equally long.
     """
     x, y, width, height = region
     columns, rows = (np.arange(0, size + STEP_PX, STEP_PX) for size in (width, height))
     nodes = np.stack(np.meshgrid(x + columns, y + rows), axis=-1).astype(np.float64)
     points = _on_board(target, camera, cam_from_obj, nodes.reshape(-1, 2))
     ends = [camera.project(rate.moved(cam_from_obj, s * seconds).apply(points)) for s in (0.5, -0.5)]
-    coarse = np.nan_to_num(ends[0] - ends[1]).reshape(nodes.shape)  # what the lens does not see does not move
-    return _between(_between(coarse, height), width, axis=1).astype(np.float32)
+    return np.nan_to_num(ends[0] - ends[1]).reshape(nodes.shape)  # what the lens does not see does not move
+
+
+def at_pixels(nodes: Array, width: int, height: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """(height, width) ways along x and along y at every pixel, bilinear between the nodes."""
+    along_x, along_y = (
+        _between(_between(way.T, width).T, height) for way in np.moveaxis(nodes.astype(np.float32), 2, 0)
+    )
+    return along_x, along_y
 
 
 def _on_board(target: Target, camera: Camera, cam_from_obj: Pose, pixels: Array) -> Array:
@@ -65,8 +73,9 @@ def _on_board(target: Target, camera: Camera, cam_from_obj: Pose, pixels: Array)
     return np.column_stack((np.clip(points, (x0, y0), (x1, y1)), np.zeros(len(points))))
 
 
-def _between(coarse: Array, size: int, axis: int = 0) -> Array:
-    """Linear interpolation along an axis from every STEP_PX-th place to all of `size`."""
+def _between(nodes: NDArray[np.float32], size: int) -> NDArray[np.float32]:
+    """Linear interpolation along the first axis from every STEP_PX-th place to all of `size`."""
     index, share = np.divmod(np.arange(size), STEP_PX)
-    weight = np.expand_dims(share / STEP_PX, tuple(i for i in range(3) if i != axis))
-    return np.take(coarse, index, axis) * (1.0 - weight) + np.take(coarse, index + 1, axis) * weight
+    weight = (share / STEP_PX).astype(np.float32)[:, None]
+    before, after = np.take(nodes, index, axis=0), np.take(nodes, index + 1, axis=0)
+    return (before + weight * (after - before)).astype(np.float32, copy=False)
