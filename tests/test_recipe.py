@@ -1,15 +1,19 @@
 """Recipes, plans and seeds."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from datasets.errors import UserError
+from datasets.override import with_regime
 from datasets.plan import Stream, frame_count, plan, rng_for, shard_count
 from datasets.recipe import describe, load_recipe, parse_recipe, recipe_names, values
 from datasets.schema import MEANING, TABLES, dictionary
 from datasets.trajectory import Helix
+from render.regimes import regimes
 from render.target import Target
 
 
@@ -107,3 +111,38 @@ def test_every_column_has_a_meaning_in_the_dictionary():
         for field in schema:
             assert field.metadata[MEANING], field.name
             assert f"| `{field.name}` |" in dictionary()
+
+
+@pytest.mark.parametrize(
+    "sensor",
+    ["", "[sensor]\n", "[sensor]\ngamma = 2.2\n", '[ sensor ] # mine\nregime = "typical"  # theirs\ngamma = 2.2\n'],
+)
+def test_a_regime_is_put_into_a_recipe_as_if_it_had_been_written(sensor):
+    _, text = load_recipe("smoke")
+    gamma = 2.2 if "gamma" in sensor else 1.0
+    for before in (f"{text}\n{sensor}", text.replace("[trajectory]", f"{sensor}\n[trajectory]")):
+        recipe = parse_recipe(with_regime(before, "harsh", "x"), "x")
+        assert recipe.sensor == dataclasses.replace(regimes()["harsh"], gamma=gamma)
+        assert recipe.model_copy(update={"sensor": regimes()["clean"]}).digest() == load_recipe("smoke")[0].digest()
+
+
+def test_a_regime_is_the_default_of_keys_that_are_left_out():
+    _, text = load_recipe("smoke")
+    recipe = parse_recipe(f'{text}\n[sensor]\nregime = "typical"\nread_noise_e = 5\n', "x")
+    assert recipe.sensor == dataclasses.replace(regimes()["typical"], read_noise_e=5.0)
+    assert values(recipe)["sensor.regime"] == '"own values"'
+    named = parse_recipe(f'{text}\n[sensor]\nregime = "typical"\n', "x")
+    assert values(named)["sensor.regime"] == '"typical"'
+    spelled = parse_recipe(
+        f"{text}\n[sensor]\n"
+        + "\n".join(f"{name} = {value}" for name, value in dataclasses.asdict(regimes()["typical"]).items()),
+        "x",
+    )
+    assert spelled.digest() == named.digest()  # a regime is a name for values
+
+
+def test_describe_shows_the_regimes(cli):
+    told = cli("describe").out
+    for name in regimes():
+        assert name in told.split("The sensor's regimes:")[1]
+    assert "[column, row]" in " ".join(told.split())  # brackets are text, not markup

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import shutil
 
 import pytest
@@ -156,3 +157,43 @@ def test_a_lost_manifest_is_made_again(copy, cli):
     (root / "manifest.json").unlink()
     assert cli("generate", recipe, "--out", root).code == 0
     assert (root / "manifest.json").read_text() == text
+
+
+def test_a_noisy_regime_needs_no_rendering_and_has_the_same_bits_in_any_order(tiny, copy, tmp_path, cli, content):
+    recipe, _ = copy
+    noisy = tmp_path / "noisy"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(generate, "render_master", lambda *_, **__: pytest.fail("rendered again"))
+        done = cli("generate", recipe, "--out", noisy, "--regime", "harsh", "--masters", tiny[1])
+    assert done.code == 0
+    assert "2 of 2 taken from" in done.out.replace("\n", " ")
+    before = content(noisy)
+    assert before != content(tiny[1])
+    assert 'regime = "harsh"' in (noisy / "recipe.toml").read_text()
+    first(noisy, "frames").unlink()  # the first shard after the second
+    assert cli("generate", noisy / "recipe.toml", "--out", noisy).code == 0
+    assert content(noisy) == before
+    alone = tmp_path / "alone"
+    assert cli("generate", noisy / "recipe.toml", "--out", alone, "--workers", 2).code == 0
+    assert content(alone) == before
+
+
+def test_only_masters_of_the_same_views_are_taken(tiny, copy, tmp_path, cli, content):
+    recipe, root = copy
+    lost, kept = sorted((root / "masters").iterdir())
+    lost.write_bytes(kept.read_bytes())  # a whole master, of another frame
+    recipe.write_text(tiny[0].replace("stop = 90", "stop = 180"))  # one view more
+    done = cli("generate", recipe, "--out", tmp_path / "more", "--masters", root)
+    assert done.code == 0
+    assert "1 of 3 taken from" in done.out.replace("\n", " ")
+    assert cli("generate", recipe, "--out", tmp_path / "alone").code == 0
+    assert content(tmp_path / "more") == content(tmp_path / "alone")
+
+
+def test_masters_are_copied_where_no_link_is_possible(tiny, copy, tmp_path, cli, monkeypatch, no_rendering):
+    def refuse(*_):
+        raise OSError(errno.EXDEV, "another disk")
+
+    monkeypatch.setattr("os.link", refuse)
+    assert cli("generate", copy[0], "--out", tmp_path / "other", "--masters", tiny[1], "--regime", "typical").code == 0
+    assert {path.stat().st_nlink for path in (tmp_path / "other" / "masters").iterdir()} == {1}

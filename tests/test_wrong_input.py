@@ -235,6 +235,52 @@ RECIPES = {
     "no such corner": (recipe("[2, 0]", "[9, 0]"), "target has no point [9, 0]"),
     "exposure zero": (added("[sensor]\nexposure = 0.0"), "sensor exposure is 0.0"),
     "lamp behind the board": (added("[light]\nlamp_position_mm = [0.0, 0.0, 5.0]"), "the lamp stands in front"),
+    "unknown regime": (added('[sensor]\nregime = "paperr"'), "sensor regime is 'paperr'; choose one of clean"),
+    "regime is a list": (added("[sensor]\nregime = [1]"), "sensor regime is [1]; choose one of clean"),
+    "negative defocus": (added("[sensor]\ndefocus_radius_px = -1.0"), "sensor defocus_radius_px is -1.0"),
+    "negative exposure time": (
+        added("[sensor]\nexposure_s = -0.1"),
+        "sensor exposure_s is -0.1; it must lie in 0 to 1",
+    ),
+    "negative full well": (added("[sensor]\nfull_well_e = -1"), "sensor full_well_e is -1.0; it must lie in 0 to"),
+    "read noise without electrons": (added("[sensor]\nread_noise_e = 2.5"), "give full_well_e, which says how many"),
+    "all light lost": (added("[sensor]\nvignetting = 1.0"), "sensor vignetting is 1.0; it must lie in 0 to 0.95"),
+    "misspelt sensor key": (added('[sensor]\nregime = "harsh"\nfull_wel_e = 1'), "(did you mean 'full_well_e'?)"),
+    "unknown kind": (recipe("step = 90", 'step = 90\nkind = "line"'), "trajectory kind is 'line'; choose one of helix"),
+    "key of another kind": (
+        recipe("stop = 90\nstep = 90", 'kind = "field"\nstep = 90'),
+        "unknown key 'trajectory.step'; known keys of kind 'field' are kind, field_deg",
+    ),
+    "misspelt key of a kind": (
+        recipe("stop = 90\nstep = 90", 'kind = "scatter"\ntilt_range = [0, 1]'),
+        "(did you mean 'tilt_range_deg'?)",
+    ),
+    "wrong type in a kind": (
+        recipe("stop = 90\nstep = 90", 'kind = "scatter"\ntilt_range_deg = 10'),
+        "key 'trajectory.tilt_range_deg' is 10",
+    ),
+    "range upside down": (
+        recipe("stop = 90\nstep = 90", 'kind = "scatter"\ntilt_range_deg = [30, 0]'),
+        "trajectory tilt_range_deg is [30.0, 0.0]; give the least and the largest",
+    ),
+    "no poses": (recipe("stop = 90\nstep = 90", 'kind = "scatter"\ncount = 0'), "trajectory count is 0"),
+    "no field angle": (recipe("stop = 90\nstep = 90", 'kind = "field"\nfield_deg = []'), "is an empty list"),
+    "field angle behind": (recipe("stop = 90\nstep = 90", 'kind = "field"\nfield_deg = [180]'), "below 180 degrees"),
+    "no azimuth": (recipe("stop = 90\nstep = 90", 'kind = "field"\nazimuth_deg = 0'), "or a count above 0"),
+    "negative distance": (recipe("stop = 90\nstep = 90", 'kind = "field"\ndistance_mm = [-1]'), "are above 0 mm"),
+    "negative speed": (
+        recipe("stop = 90\nstep = 90", 'kind = "field"\nspeed_mm_per_s = -1'),
+        "trajectory speed_mm_per_s is -1.0",
+    ),
+    "scatter that fits nowhere": (
+        recipe("stop = 90\nstep = 90", 'kind = "scatter"\noffset_range_mm = [5000, 6000]'),
+        "none of 2000 random poses has the whole target in every camera",
+    ),
+    "field of a camera": (added("max_field_deg = -5"), "has max_field_deg -5.0; it must lie in 0 to 180 degrees"),
+    "camera without a view": (
+        added("max_field_deg = 1"),
+        "sees no pose, as max_field_deg is 1; raise it",
+    ),
     "step zero": (recipe("step = 90", "step = 0"), "trajectory step is 0"),
     "stop before start": (recipe("stop = 90", "stop = -90"), "stop must not come first"),
     "board behind the camera": (
@@ -264,6 +310,25 @@ CASES = RECIPES | {
     "out not empty": (out_not_empty, "is not empty and holds no dataset"),
     "no dataset": (lambda place: ("detect", place.folder), "holds no dataset (recipe.toml is missing)"),
     "dataset is a file": (lambda place: ("verify", place.recipe()), "holds no dataset"),
+    "masters from nowhere": (
+        lambda place: ("generate", place.recipe(), "--out", place.new(), "--masters", place.folder / "no"),
+        "holds no dataset (recipe.toml is missing)",
+    ),
+    "masters from here": (
+        lambda place: ("generate", place.recipe(), "--out", (root := place.dataset()), "--masters", root),
+        "is the dataset that is to be made; give the folder of another one",
+    ),
+    "regime on the command line": (
+        lambda place: ("run", place.recipe(), "--out", place.new(), "--regime", "best"),
+        "sensor regime is 'best'; choose one of clean, typical, paper, harsh",
+    ),
+    "regime where no line fits": (
+        lambda place: (
+            *("run", place.recipe("sensor = {gamma = 2.2}\n" + place.text), "--out", place.new()),
+            *("--regime", "harsh"),
+        ),
+        'write regime = "harsh" under [sensor] there',
+    ),
     # Damaged files.
     "truncated frames": (damaged("frames", half, "detect", without=["detections"]), "delete it and run the generate"),
     "truncated frames, verify": (damaged("frames", half, "verify"), "is damaged; delete it"),
