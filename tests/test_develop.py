@@ -165,12 +165,12 @@ def test_only_motion_across_an_edge_blurs_it(way, along):
     grey = develop(light, model, shot(rate=Rate(velocity, np.zeros(3)))).astype(float)
     expected = 255.0 * blurred_edge(distance, 0.0 if along else way, 1.0)
     error = (grey - expected)[(np.abs(distance) < 2.0) & (np.abs(y) < 60)]
-    # Half a level of rounding. OpenCV rounds places to 1/32 px, so up to 1/64 px, where the edge rises 100 levels per px;
+    # Half a level of rounding. OpenCV rounds places to 1/32 px, by up to 1/64 px, where the edge rises 100 levels a px;
     # of those 1.6 levels the mean of four moments keeps a third.
     assert np.abs(error).max() < 1.0
-    # Rounding alone is 0.29. The wrong diagonal would add half the variance, way^2 / 24, times the bend of the edge, up
-    # to 62 grey levels per px^2: 0.5 at the least.
-    assert np.sqrt(np.mean(error**2)) < 0.36
+    # Rounding alone is 0.29, that of the places adds as much again. In short ways the wrong diagonal would add half the
+    # variance, way^2 / 24, times the bend of the edge, up to 62 grey levels per px^2: 0.5 at the least.
+    assert np.sqrt(np.mean(error**2)) < (0.36 if way <= SHORT_PX else 0.45)
 
 
 def test_a_way_too_short_to_be_seen_changes_nothing():
