@@ -118,7 +118,7 @@ ESTIMATES = pa.schema(
         _field("reprojection_rmse_px", pa.float64(), "root mean squared reprojection error, assumed camera"),
         _field(
             "covariance",
-            pa.list_(pa.float64(), 36),
+            pa.list_(pa.field("element", pa.float64()), 36),
             "6 x 6, row by row: rotation vector on the left in the camera frame, rad; then t, mm. NaN without noise",
         ),
     ]
