@@ -22,6 +22,7 @@ from eposit.arrays import Array
 PARAMETERS = 13  # rotation 3, translation 3, lens 7
 NEWTON_STEPS = 12
 TRIES = 8
+LEAST_GAIN = 1e-7  # of the cost in one step; what a view hardly tells converges slowly
 
 
 @njit(cache=True)
@@ -141,7 +142,7 @@ def fit(
                 cost, damping = new, max(0.1 * damping, 1e-9)
                 break
             damping *= 10.0
-        if gain < 1e-4:
+        if gain < LEAST_GAIN:
             break
     return R, t, lens
 

@@ -13,9 +13,10 @@ from pipelines import freelens
 FOCAL_SHARES = (0.2, 0.3, 0.45, 0.7, 1.1, 2.0)  # focal lengths to start from, as shares of the picture's width
 WIDEST_RAD = 2.2  # largest angle of a ray that a start may give a corner
 START_CORNERS = 16  # that a start is worked out from
-FIT_STEPS = 30
+FIT_STEPS = 60
 FREE = np.array([0.0, 2e-2, 100.0, 100.0, 0.3, 0.3, 0.3])  # how far a lens may lie from the start: see `freelens`
 HOLD_SHARE = 1e-6  # weight of that against one pixel of one corner: it decides only what nothing else does
+FIRM_HOLD = 1.0
 BEND_STEP = 0.05  # squares; second differences at this step are good to 1e-5 px
 OUTLIER_PX = 1.5  # a worst corner farther off than this has all corners weighed by their distances
 GENTLE_PX = 0.5  # distance at which such a weight is one half
@@ -31,28 +32,34 @@ class BoardMap:
 
     @staticmethod
     def fit(
-        at: Array, corners_px: Array, size: tuple[int, int], weights: Array, start: BoardMap | None = None
+        at: Array,
+        corners_px: Array,
+        size: tuple[int, int],
+        weights: Array,
+        start: BoardMap | None = None,
+        hold: float = HOLD_SHARE,
     ) -> BoardMap:
         """Least squares over corners (n, 2) px of points (n, 2) in squares.
 
         size: width and height of the picture, px. weights: (n,) inverse variances, 0 for a corner that takes no part.
-        start: a map near by; without it, focal lengths over the whole range are tried.
+        start: a map near by; without it, focal lengths over the whole range are tried. hold: how firmly the lens stays
+        near the start's; corners that are only known to a pixel would bend it at will.
         """
         begin = _start(at, corners_px, size, weights > 0.0) if start is None else start
-        hold = np.zeros(7)
-        hold[1:] = HOLD_SHARE * np.median(weights[weights > 0.0]) / FREE[1:] ** 2
+        held = np.zeros(7)
+        held[1:] = hold * np.median(weights[weights > 0.0]) / FREE[1:] ** 2
         x, y = (np.ascontiguousarray(column) for column in at.T)
         pixels = np.where(weights[:, None] > 0.0, corners_px, 0.0)
-        return BoardMap(*freelens.fit(begin.R, begin.t, begin.lens, x, y, pixels, weights, hold, FIT_STEPS))
+        return BoardMap(*freelens.fit(begin.R, begin.t, begin.lens, x, y, pixels, weights, held, FIT_STEPS))
 
     @staticmethod
     def fit_rough(at: Array, corners_px: Array, size: tuple[int, int], use: Mask) -> BoardMap:
         """The map through corners of which some may be a few pixels off."""
-        board = BoardMap.fit(at, corners_px, size, use.astype(np.float64))
+        board = BoardMap.fit(at, corners_px, size, use.astype(np.float64), hold=FIRM_HOLD)
         distance = np.linalg.norm(board(at) - corners_px, axis=1)
         if distance[use].max() <= OUTLIER_PX:
             return board
-        return BoardMap.fit(at, corners_px, size, use / (1.0 + (distance / GENTLE_PX) ** 2), board)
+        return BoardMap.fit(at, corners_px, size, use / (1.0 + (distance / GENTLE_PX) ** 2), board, FIRM_HOLD)
 
     def __call__(self, at: Array, height: float = 0.0) -> Array:
         """(m, 2) or (2,) points in squares, `height` squares above the board, to (m, 2) or (2,) px."""
