@@ -24,14 +24,14 @@ LARGE_PX = 45  # side of a patch from which the blur is well sampled by the coar
 CLEAR_BLURS = 3.0  # blurs between a pixel and the next black square
 BAND_PX = 1.5  # pixels of the board around the circle, beyond that
 LEAST_PIXELS = 40
-STEPS, STOP_RADII = 25, 2e-4
+STEPS, STOP = 25, 0.05  # step, in standard deviations, at which a fit has converged
 START_SHADOW = (0.06, 0.06, 0.06)  # place and softness, radii
 SIZE_SPREAD = 0.003  # the board's map gives the size to this: nearer or farther it looks the same to five in a thousand
 SHADOW_SPREAD, SOFTNESS_MEAN, SOFTNESS_SPREAD = 0.3, 0.05, 0.05  # radii
 LEAST_CONTRAST = 0.35  # of the board's: what a circle's edge must have
-SEARCH_SHARE = 0.25  # of a square: how far the centre may lie from where the board predicts it
+SEARCH_SHARE = 0.1  # of a square: how far the centre may lie from where the board predicts it
 SIZE_LIMIT = 0.03  # of the size
-MISFIT_LIMIT = 0.06  # standard deviation of the residuals as a share of the contrast, beyond the corners' own
+LEAST_AXIS = 1.5  # blurs: a disc whose smaller half axis is below this has no edges of its own
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +63,8 @@ def find_circle(image: Grey, board: BoardMap, blur_px: float, contrast: float, t
     at, height = target.circle_centre[:2] / target.square_mm, target.circle_height_mm / target.square_mm
     radius = target.circle_radius_mm / target.square_mm
     centre, jacobian = board(at, height), board.jacobian(at, height)
+    if np.linalg.svd(jacobian, compute_uv=False)[-1] * radius < LEAST_AXIS * blur_px:
+        return None
     patch = _patch(image, board, centre, jacobian, blur_px, target)
     if patch is None:
         return None
@@ -70,7 +72,7 @@ def find_circle(image: Grey, board: BoardMap, blur_px: float, contrast: float, t
     start, expected, spread = _beforehand(contrast)
     fitted, covariance, _, converged = fit_disc(
         patch.grey, patch.rows, patch.columns, patch.on_board, patch.on_disc, patch.fields, per_px,
-        _kernel(blur_px, patch.finer), patch.finer, start, expected, spread, STEPS, STOP_RADII,
+        _kernel(blur_px, patch.finer), patch.finer, start, expected, spread, STEPS, STOP,
     )  # fmt: skip
     shift = fitted[:2]
     found = converged and np.linalg.norm(shift) * radius < SEARCH_SHARE and abs(fitted[SIZE] - 1.0) < SIZE_LIMIT

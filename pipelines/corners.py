@@ -14,7 +14,7 @@ from render.target import Target
 
 FIRST_WINDOW_PX, WINDOW_PX = 5, 10  # half side of the pixels that the first and the final fit may use
 FIRST_STEPS, STEPS = 5, 12
-FIRST_STOP_PX, STOP_PX = 0.03, 3e-4
+FIRST_STOP, STOP = 0.5, 0.02  # steps, in standard deviations, at which a fit has converged
 START_BLUR_PX = 0.8
 REACH, LEAST_REACH = 0.55, 0.25  # squares from the corner; at most this far, at least this far
 CLEAR_BLURS = 2.6  # blurs to keep between a fit's pixels and the next edge
@@ -79,7 +79,7 @@ def _fit(image: Grey, board: BoardMap, target: Target, shapes: Array, window: in
     lengths = np.linalg.norm(jacobian, axis=1)
     reach = np.clip(1.0 - CLEAR_BLURS * shapes[:, BLUR, None] / lengths, LEAST_REACH, REACH)
     discs, disc_axes = _around_circle(board, target)
-    stop = FIRST_STOP_PX if window == FIRST_WINDOW_PX else STOP_PX
+    stop = FIRST_STOP if window == FIRST_WINDOW_PX else STOP
     fitted, covariance, _, converged = fit_corners(
         image, starts, shapes, board.curvatures(at, jacobian), np.linalg.inv(jacobian), reach, window, discs,
         disc_axes, steps, stop,

@@ -93,7 +93,8 @@ def fit_disc(
     grey: (n,) values of the pixels at rows, columns (n,) of the patch. u, v: (2, h, w) places of the fine grid on the
     board and on the disc's plane, in radii. fields: (3, h, w) slopes x, y in radii and the blocked share. per_px:
     (2, 2) radii per px. kernel: (k,) taps of the blur on the fine grid, `finer` cells to a pixel. start: (6,) shape.
-    expected, spread: (12,) what is known beforehand, as mean and standard deviation.
+    expected, spread: (12,) what is known beforehand, as mean and standard deviation. stop: step, in standard deviations
+    of what is fitted, at which it has converged.
 
     Returns:
         (12,) the fit, (12, 12) covariance, standard deviation of the residuals where they tell the place, convergence.
@@ -155,7 +156,7 @@ def fit_disc(
         for k in range(SHAPE):
             damped[k, k] += damping * normal[k, k]
         step = np.linalg.solve(damped, right)
-        if abs(step[0]) < stop and abs(step[1]) < stop:
+        if np.dot(right, step) <= stop * stop * noise:
             p[:SHAPE] += step[:SHAPE]
             converged = True
             break

@@ -153,14 +153,15 @@ def fit_corners(
     discs: Array,
     disc_axes: Array,
     steps: int,
-    stop_px: float,
+    stop: float,
 ) -> tuple[Array, Array, NDArray[np.int64], Mask]:
     """Fit every corner by Levenberg-Marquardt.
 
     image: (height, width) 8 bits. starts: (n, 2) px. shapes: (n, 9) where to start from; without a mean grey (NaN),
     mean and contrast are worked out. bends: (n, 2) curvatures of the edges towards their normals, 1/px. inverses:
     (n, 2, 2) squares per px. reaches: (n, 2) squares that a fit may use along both axes. window: px, likewise.
-    discs: (k, 2) centres, px, of ellipses to leave out, with disc_axes (2, 2) from px to the unit circle.
+    discs: (k, 2) centres, px, of ellipses to leave out, with disc_axes (2, 2) from px to the unit circle. stop: step,
+    in standard deviations of what is fitted, at which it has converged.
 
     Returns:
         (n, 9) shapes with the corner in px of the image, (n, 2, 2) covariances, px^2, for the noise that the pixels
@@ -199,7 +200,7 @@ def fit_corners(
                 damping *= 10.0
             if not _solve(normal, right, damping, step):
                 break
-            small = abs(step[0]) < stop_px and abs(step[1]) < stop_px
+            small = np.dot(right, step) <= stop * stop * noise
             for k in range(SHAPE):
                 trial[k] = p[k] + min(max(step[k], -FURTHEST_STEP[k]), FURTHEST_STEP[k])
             trial[BLUR] = min(max(trial[BLUR], BLUR_LIMITS_PX[0]), BLUR_LIMITS_PX[1])
