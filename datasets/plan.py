@@ -16,7 +16,7 @@ from eposit import Pose
 class Stream(IntEnum):
     """What a random number is for."""
 
-    RENDER = 0  # subpixel positions, keyed by frame
+    RENDER = 0  # rays of a path-traced reference, keyed by frame
     POINT_NOISE = 1  # noise on truth points, keyed by pose and draw
 
 
