@@ -60,7 +60,7 @@ FRAMES = pa.schema(
             ("region_width_px", "width of the rendered region"),
             ("region_height_px", "height of the rendered region"),
         )),
-        _field("render_seed", pa.int64(), "seed of the path-traced reference of the frame; the picture itself has no random numbers"),
+        _field("render_seed", pa.int64(), "seed of a path-traced reference; the picture has no random numbers"),
         _field("master", pa.string(), "path of the linear-light EXR within the dataset"),
     ]
 )  # fmt: skip

@@ -99,7 +99,12 @@ def _master(dataset: Dataset, frame: Frame) -> tuple[Master, str]:
     camera = frame.camera.true_camera()
     try:
         master = render_master(
-            recipe.target, recipe.light, camera, frame.cam_from_obj, samples=recipe.samples, seed=frame.render_seed
+            recipe.target,
+            recipe.light,
+            camera,
+            frame.cam_from_obj,
+            samples=recipe.sample_count(),
+            seed=frame.render_seed,
         )
         write_master(master, camera, path, key)
     except OSError as error:
@@ -117,7 +122,7 @@ def _master_key(recipe: Recipe, frame: Frame) -> str:
         "camera": asdict(frame.camera.true_camera()),
         "R": frame.cam_from_obj.R.tolist(),
         "t": frame.cam_from_obj.t.tolist(),
-        "samples": recipe.samples,
+        "samples": recipe.sample_count(),
         "seed": frame.render_seed,
     }
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
