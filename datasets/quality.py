@@ -22,7 +22,7 @@ class Quality:
 QUALITIES: dict[QualityName, Quality] = {
     "draft": Quality(16, 2.0, ""),
     "standard": Quality(64, 0.5, ""),
-    "reference": Quality(1024, 0.05, ""),
+    "reference": Quality(1024, 0.02, ""),
 }
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pyarrow as pa
 
@@ -17,8 +19,11 @@ def is_done(dataset: Dataset, index: int) -> bool:
     return dataset.is_done(dataset.shard_path("detections", index, shard_count(dataset.recipe)))
 
 
-def run_shard(dataset: Dataset, index: int) -> None:
-    """Make one shard of `detections` from the same shard of `frames`."""
+def run_shard(dataset: Dataset, index: int, advance: Callable[[], None] = lambda: None) -> None:
+    """Make one shard of `detections` from the same shard of `frames`.
+
+    advance: called after each frame.
+    """
     count = shard_count(dataset.recipe)
     path = dataset.shard_path("frames", index, count)
     frames = dataset.read_shard(path)
@@ -36,4 +41,5 @@ def run_shard(dataset: Dataset, index: int) -> None:
             "blur_px": np.full(n, found.blur_px),
         }
         parts.append(table(DETECTIONS, columns))
+        advance()
     dataset.write_shard(dataset.shard_path("detections", index, count), pa.concat_tables(parts))

@@ -116,6 +116,9 @@ def write_master(master: Master, camera: Camera, path: Path, key: str = "") -> N
     """EXR with the region as data window inside the picture as display window; atomic, lossless.
 
     key: what the master was made from, for `read_master` to compare.
+
+    ZIP, of what every reader of EXR knows: 55 % of the size at 5 ms of a fish-eye region of 359 x 333 px; none 1.7 ms;
+    ZIPS 63 % at 9 ms; PIZ 59 % at 14 ms. HTJ2K has 33 % at 3 ms, but only OpenEXR 3.4 and later read it.
     """
     import OpenEXR
 
