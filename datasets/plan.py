@@ -21,7 +21,7 @@ from render.motion import Rate
 class Stream(IntEnum):
     """What a random number is for."""
 
-    RENDER = 0  # subpixel positions, keyed by frame
+    RENDER = 0  # rays of a path-traced reference, keyed by frame
     POINT_NOISE = 1  # noise on truth points, keyed by pose and draw
     SENSOR = 2  # noise and the light's direction, keyed by frame
     POSE = 3  # scattered poses, keyed by pose

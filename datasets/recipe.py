@@ -18,6 +18,7 @@ from datasets.cameras import CameraSpec
 from datasets.cameras import assumed_camera as assumed_camera
 from datasets.errors import UserError
 from datasets.keys import Key, keys_of, sentence, values_of
+from datasets.quality import QUALITIES, QualityName, quality_text
 from datasets.trajectory import TRAJECTORIES, Helix, Trajectory
 from render.light import Light
 from render.regimes import DEFAULT_REGIME, SensorModel, regimes
@@ -35,7 +36,13 @@ class Recipe(BaseModel):
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$", description="name of the dataset")]
     description: Annotated[str, Field(description="what it is for, one line")] = ""
     seed: Annotated[int, Field(ge=0, lt=2**63, description="seed of everything random; 0 is a seed")] = 0
-    samples: Annotated[int, Field(ge=1, le=65536, description="rays per pixel, a square number")] = 64
+    quality: Annotated[QualityName, Field(description=f"how finely edges are rendered: {quality_text()}")] = "standard"
+    samples: Annotated[
+        int | None,
+        Field(
+            ge=1, le=65536, description="cells of a pixel where edges meet, a square number; the quality's if left out"
+        ),
+    ] = None
     shard_frames: Annotated[int, Field(ge=1, le=10000, description="frames in one shard")] = 10
     allow_cropped: Annotated[bool, Field(description="whether target points may lie outside the image")] = False
     four: Annotated[
@@ -53,8 +60,8 @@ class Recipe(BaseModel):
 
     @field_validator("samples")
     @classmethod
-    def _square(cls, samples: int) -> int:
-        if round(samples**0.5) ** 2 != samples:
+    def _square(cls, samples: int | None) -> int | None:
+        if samples is not None and round(samples**0.5) ** 2 != samples:
             raise ValueError(f"samples is {samples}; it must be a square number such as 16, 64 or 256")
         return samples
 
@@ -70,6 +77,10 @@ class Recipe(BaseModel):
             )
         return self
 
+    def sample_count(self) -> int:
+        """`samples`, or the quality's."""
+        return QUALITIES[self.quality].samples if self.samples is None else self.samples
+
     def four_indices(self) -> list[int]:
         """Rows in `Target.points` of the four points, M0 first."""
         across, down = self.target.inner
@@ -80,8 +91,9 @@ class Recipe(BaseModel):
         return hash(self.digest())
 
     def digest(self) -> str:
-        """Hash of everything that decides the content; name and description do not."""
-        content = self.model_dump(mode="json", exclude={"name", "description"})
+        """Hash of everything that decides the content; name and description do not, nor how samples are chosen."""
+        content = self.model_dump(mode="json", exclude={"name", "description", "quality"})
+        content["samples"] = self.sample_count()
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 

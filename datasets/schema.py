@@ -62,7 +62,7 @@ FRAMES = pa.schema(
             ("region_width_px", "width of the rendered region"),
             ("region_height_px", "height of the rendered region"),
         )),
-        _field("render_seed", pa.int64(), "seed of the subpixel positions"),
+        _field("render_seed", pa.int64(), "seed of a path-traced reference; the picture has no random numbers"),
         _field("sensor_seed", pa.int64(), "seed of the noise and of the light's direction"),
         _field("master", pa.string(), "path of the linear-light EXR within the dataset"),
     ]

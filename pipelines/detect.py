@@ -5,6 +5,7 @@ Each detector has its own shards beside the others'; those of our own have no na
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -39,8 +40,11 @@ def is_done(dataset: Dataset, index: int, detector: str) -> bool:
     return dataset.is_done(path_of(dataset, index, detector))
 
 
-def run_shard(dataset: Dataset, index: int, detector: str) -> None:
-    """Make one shard of `detections` from the same shard of `frames`."""
+def run_shard(dataset: Dataset, index: int, advance: Callable[[], None] = lambda: None, *, detector: str) -> None:
+    """Make one shard of `detections` from the same shard of `frames`.
+
+    advance: called after each frame.
+    """
     path = dataset.shard_path("frames", index, shard_count(dataset.recipe))
     frames = dataset.read_shard(path, ["frame_id", "image"])
     parts: list[pa.Table] = []
@@ -61,4 +65,5 @@ def run_shard(dataset: Dataset, index: int, detector: str) -> None:
             "blur_px": np.full(n, found.blur_px),
         }
         parts.append(table(DETECTIONS, columns))
+        advance()
     dataset.write_shard(path_of(dataset, index, detector), pa.concat_tables(parts))

@@ -24,6 +24,11 @@ def check_workers(workers: int) -> None:
         raise UserError(f"{workers} workers are not usable; give --workers from 1 to {MAX_WORKERS}")
 
 
+def runs_here(tasks: Sequence[Task], workers: int) -> bool:
+    """Whether `map_shards` would run these tasks in this process."""
+    return workers == 1 or len(tasks) < 2
+
+
 def map_shards(run_one: Callable[[Task], None], tasks: Sequence[Task], workers: int) -> Iterator[Task]:
     """Run every task, here or in `workers` processes, and yield each when it is done, in any order.
 
@@ -32,7 +37,7 @@ def map_shards(run_one: Callable[[Task], None], tasks: Sequence[Task], workers: 
         Exception: what a task raised; tasks not yet begun are cancelled.
     """
     check_workers(workers)
-    if workers == 1 or len(tasks) < 2:
+    if runs_here(tasks, workers):
         for task in tasks:
             run_one(task)
             yield task

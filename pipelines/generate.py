@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from datasets.recipe import Recipe
 from datasets.schema import FRAMES, KEYPOINTS
 from datasets.store import MASTERS, Dataset, refused
 from eposit.pose import tilt_rad
+from pipelines.overlap import overlapped
 from pipelines.rows import pose_columns, table
 from render.develop import Shot, develop, encode_png
 from render.master import Master, MasterError, read_master, render_master, write_master
@@ -30,11 +32,15 @@ def is_done(dataset: Dataset, index: int) -> bool:
     return all((dataset.root / _master_path(frame)).is_file() for frame in _frames(dataset.recipe, index))
 
 
-def run_shard(dataset: Dataset, index: int) -> None:
-    """Make one shard of `frames` and `keypoints` and its masters."""
+def run_shard(dataset: Dataset, index: int, advance: Callable[[], None] = lambda: None) -> None:
+    """Make one shard of `frames` and `keypoints` and its masters.
+
+    advance: called after each frame.
+    """
     recipe = dataset.recipe
     count, chosen = shard_count(recipe), _frames(recipe, index)
-    rows = [_frame_row(dataset, frame) for frame in chosen]
+    makers = (functools.partial(_finish, dataset, frame, *_light(dataset, frame)) for frame in chosen)
+    rows = list(overlapped(makers, advance))
     truth = pa.concat_tables(_keypoints(recipe, frame) for frame in chosen)
     dataset.write_shard(dataset.shard_path("keypoints", index, count), truth)
     dataset.write_shard(dataset.shard_path("frames", index, count), pa.Table.from_pylist(rows, schema=FRAMES))
@@ -44,10 +50,34 @@ def _frames(recipe: Recipe, index: int) -> tuple[Frame, ...]:
     return plan(recipe)[index * recipe.shard_frames : (index + 1) * recipe.shard_frames]
 
 
-def _frame_row(dataset: Dataset, frame: Frame) -> dict[str, object]:
+def _light(dataset: Dataset, frame: Frame) -> tuple[Master, bool]:
+    """The frame's linear light, and whether it is new: read if it is there and made from the same things."""
+    recipe = dataset.recipe
+    try:
+        return read_master(dataset.root / _master_path(frame), _master_key(recipe, frame)), False
+    except MasterError:
+        pass
+    try:
+        return render_master(
+            recipe.target,
+            recipe.light,
+            frame.camera.true_camera(),
+            frame.cam_from_obj,
+            samples=recipe.sample_count(),
+        ), True
+    except ValueError as error:
+        raise UserError(f"frame {frame.frame_id}: {error}") from error
+
+
+def _finish(dataset: Dataset, frame: Frame, master: Master, is_new: bool) -> dict[str, object]:
+    """Write the master if it is new, develop it, and make the frame's row."""
     recipe, spec = dataset.recipe, frame.camera
-    camera = spec.true_camera()
-    master, path = _master(dataset, frame)
+    camera, relative = spec.true_camera(), _master_path(frame)
+    if is_new:
+        try:
+            write_master(master, camera, dataset.root / relative, _master_key(recipe, frame))
+        except OSError as error:
+            raise refused(dataset.root / relative, error) from error
     shot = Shot(recipe.target, camera, frame.cam_from_obj, frame.rate, master.region, frame.sensor_seed)
     image = develop(master.full(camera), recipe.sensor, shot)
     coefficients = np.zeros(4)
@@ -75,7 +105,7 @@ def _frame_row(dataset: Dataset, frame: Frame) -> dict[str, object]:
         **region,
         "render_seed": frame.render_seed,
         "sensor_seed": frame.sensor_seed,
-        "master": path,
+        "master": relative,
     }
 
 
@@ -89,28 +119,6 @@ def _master_path(frame: Frame) -> str:
     return f"{MASTERS}/{frame.frame_id:06d}.exr"
 
 
-def _master(dataset: Dataset, frame: Frame) -> tuple[Master, str]:
-    """The frame's linear light: read if it is there and made from the same things, rendered otherwise."""
-    recipe = dataset.recipe
-    relative = _master_path(frame)
-    path, key = dataset.root / relative, _master_key(recipe, frame)
-    try:
-        return read_master(path, key), relative
-    except MasterError:
-        pass
-    camera = frame.camera.true_camera()
-    try:
-        master = render_master(
-            recipe.target, recipe.light, camera, frame.cam_from_obj, samples=recipe.samples, seed=frame.render_seed
-        )
-        write_master(master, camera, path, key)
-    except OSError as error:
-        raise refused(path, error) from error
-    except ValueError as error:
-        raise UserError(f"frame {frame.frame_id}: {error}") from error
-    return master, relative
-
-
 def _master_key(recipe: Recipe, frame: Frame) -> str:
     """Hash of all that decides a master; the sensor model is not among it."""
     parts = {
@@ -119,8 +127,7 @@ def _master_key(recipe: Recipe, frame: Frame) -> str:
         "camera": asdict(frame.camera.true_camera()),
         "R": frame.cam_from_obj.R.tolist(),
         "t": frame.cam_from_obj.t.tolist(),
-        "samples": recipe.samples,
-        "seed": frame.render_seed,
+        "samples": recipe.sample_count(),
     }
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterable, Sequence
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
-from datasets.plan import shard_count
+from datasets.plan import frame_count, shard_count
 from datasets.store import Dataset
 from pipelines import detect, estimate, generate, score
 from pipelines.detection import Detector
-from pipelines.engine import check_workers, map_shards
+from pipelines.engine import check_workers, map_shards, runs_here
 from pipelines.estimate import Setting
 
 Shard = TypeVar("Shard")
@@ -39,7 +39,7 @@ class _Rate(ProgressColumn):
 def run_generate(dataset: Dataset, workers: int, console: Console) -> None:
     """Render what is missing."""
     indices = range(shard_count(dataset.recipe))
-    _run("generate", dataset, indices, generate.is_done, generate.run_shard, workers, console)
+    _run("generate", dataset, indices, generate.is_done, generate.run_shard, workers, console, by_frame=True)
 
 
 def run_detect(dataset: Dataset, workers: int, console: Console, detector: str = Detector.EDGE_FIT) -> None:
@@ -57,6 +57,7 @@ def run_detect(dataset: Dataset, workers: int, console: Console, detector: str =
         functools.partial(detect.run_shard, detector=detector),
         workers,
         console,
+        by_frame=True,
     )
 
 
@@ -89,22 +90,39 @@ def _run(
     dataset: Dataset,
     shards: Sequence[Shard],
     is_done: Callable[[Dataset, Shard], bool],
-    run_shard: Callable[[Dataset, Shard], None],
+    run_shard: Callable[..., None],
     workers: int,
     console: Console,
+    *,
+    by_frame: bool = False,
 ) -> None:
+    """Do the missing shards.
+
+    by_frame: shards are numbers, and `run_shard` takes an `advance` to call after each frame. The bar then counts
+    frames; from other processes their shards are told when they are whole.
+    """
     check_workers(workers)
     missing = [shard for shard in shards if not is_done(dataset, shard)]
     if not missing:
         console.print(f"{name}: all {len(shards)} shards are there")
         dataset.write_manifest()
         return
+    sizes = {shard: _frames_in(dataset, shard) if by_frame else 1 for shard in shards}
     columns = (
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("shards"), _Rate(),
-        TimeRemainingColumn(),
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(),
+        TextColumn("frames" if by_frame else "shards"), _Rate(), TimeRemainingColumn(),
     )  # fmt: skip
     with Progress(*columns, console=console, disable=console.quiet) as progress:
-        bar = progress.add_task(name, total=len(shards), completed=len(shards) - len(missing))
-        for _ in map_shards(functools.partial(run_shard, dataset), missing, workers):
-            progress.advance(bar)
+        total, left = sum(sizes.values()), sum(sizes[shard] for shard in missing)
+        bar = progress.add_task(name, total=total, completed=total - left)
+        run_one, told = functools.partial(run_shard, dataset), by_frame and runs_here(missing, workers)
+        if told:
+            run_one = functools.partial(run_one, advance=functools.partial(progress.advance, bar))
+        for shard in map_shards(run_one, missing, workers):
+            progress.advance(bar, 0 if told else sizes[shard])
     dataset.write_manifest()
+
+
+def _frames_in(dataset: Dataset, index: Any) -> int:
+    size = dataset.recipe.shard_frames
+    return min(size, frame_count(dataset.recipe) - size * index)

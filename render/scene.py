@@ -1,4 +1,7 @@
-"""Mitsuba scenes of the target. The object frame is the world frame: the board stands still and the camera moves."""
+"""Mitsuba scenes of the target. The object frame is the world frame: the board stands still and the camera moves.
+
+Our own pictures need no scene (`render.trace`); the reference and the benchmarks do.
+"""
 
 from __future__ import annotations
 
@@ -8,22 +11,15 @@ from typing import Any
 import numpy as np
 
 from render import backend
-from render.light import Light, reference_irradiance, shading_map
+from render.light import Light, reference_irradiance
 from render.target import Target
 
 
 @functools.lru_cache(maxsize=4)
-def lookup_scene(target: Target, light: Light) -> Any:
-    """The board with its light looked up from a map, for `render.trace`: primary rays only, no noise of shading."""
+def bare_scene(target: Target) -> Any:
+    """The target's shapes and reflectance without any light, for rays that only ask what they hit."""
     mi = backend.load()
-    board, circle = shading_map(target, light)
-    return mi.load_dict(
-        {
-            "type": "scene",
-            "board": {**_board(mi, target), "shading": _smooth_texture(mi, board)},
-            "circle": {**_circle(mi, target), "shading": {"type": "uniform", "value": circle}},
-        }
-    )
+    return mi.load_dict({"type": "scene", "board": _board(mi, target), "circle": _circle(mi, target)})
 
 
 @functools.lru_cache(maxsize=4)
@@ -97,8 +93,3 @@ def _circle(mi: Any, target: Target) -> dict[str, Any]:
         "to_world": transform().translate(list(target.circle_centre)) @ transform().scale([radius, radius, 1.0]),
         "bsdf": {"type": "diffuse", "reflectance": {"type": "uniform", "value": target.circle}},
     }
-
-
-def _smooth_texture(mi: Any, values: Any) -> dict[str, Any]:
-    bitmap = mi.Bitmap(np.ascontiguousarray(values[..., None], dtype=np.float32))
-    return {"type": "bitmap", "bitmap": bitmap, "raw": True, "filter_type": "bilinear", "wrap_mode": "clamp"}

@@ -1,7 +1,7 @@
 """The fish-eye sensor plugin: one for all lenses, by exact per-ray inverse projection.
 
+It is what makes Mitsuba's own integrators see through our lenses: they are the reference for `render.trace`.
 Only here are pixel coordinates shifted by half a pixel: Mitsuba's pixel i covers [i, i + 1), OpenCV's centre is i.
-The inverse laws stand here a second time, in Dr.Jit; tests hold both against OpenCV and closed forms.
 """
 
 from __future__ import annotations
@@ -10,13 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from eposit import Camera, Pose, get_lens
-from eposit.lens import KANNALA_BRANDT
+from eposit import Camera, Pose
 from render import backend
+from render.rays import opaque_law, sine_cosine
 
 SENSOR = "eposit_fisheye"
 HALF_PIXEL = 0.5
-INVERSION_STEPS = 24  # Newton steps inside a bracket; float32 needs about 6, a flat slope at the rim more
 
 
 def sensor_dict(camera: Camera, cam_from_obj: Pose, region: tuple[int, int, int, int], samples: int) -> dict[str, Any]:
@@ -61,29 +60,24 @@ def register_sensor(mi: Any, dr: Any) -> None:
             super().__init__(props)
             coefficients = tuple(props[f"k{i}"] for i in range(1, 5) if f"k{i}" in props)
             fx, fy, cx, cy = (props[name] for name in ("fx", "fy", "cx", "cy"))
-            law = get_lens(props["lens"], coefficients)
             to_world = np.array(props["to_world"].matrix, dtype=np.float64)
             size, offset = self.film().crop_size(), self.film().crop_offset()
-            self.law = law.name
+            self.law = opaque_law(mi, dr, props["lens"], coefficients)
             # From the film position in [0, 1] of the crop to normalised image coordinates. The constants are worked
             # out in double precision: at 1600 px a float32 coordinate is only good to 1e-4 px.
             scale = np.array([size.x / fx, size.y / fy])
             shift = np.array([(offset.x - HALF_PIXEL - cx) / fx, (offset.y - HALF_PIXEL - cy) / fy])
             self.scale, self.shift = mi.Vector2f(scale), mi.Vector2f(shift)
             self.rotation, self.origin = mi.Matrix3f(to_world[:3, :3]), mi.Point3f(to_world[:3, 3])
-            finite_rim = law.rho_max if np.isfinite(law.rho_max) else 1e30
-            self.rho_max, self.theta_max = mi.Float(finite_rim), mi.Float(law.theta_max)
-            self.coefficients = [mi.Float(k) for k in coefficients]
             # Opaque, so that one kernel serves all poses, regions and cameras of a lens.
-            dr.make_opaque(self.scale, self.shift, self.rotation, self.origin, self.rho_max, self.theta_max)
-            dr.make_opaque(self.coefficients)
+            dr.make_opaque(self.scale, self.shift, self.rotation, self.origin)
             self.m_needs_sample_2 = True
 
         def sample_ray(self, time: Any, sample1: Any, sample2: Any, sample3: Any, active: Any = True) -> Any:
             image = sample2 * self.scale + self.shift
             radius = dr.norm(image)
-            seen = radius <= self.rho_max
-            sine, cosine = _sine_cosine(dr, mi, self, dr.minimum(radius, self.rho_max))
+            seen = radius <= self.law.rho_max
+            sine, cosine, _ = sine_cosine(mi, dr, self.law, dr.minimum(radius, self.law.rho_max))
             side = dr.select(radius > 0.0, sine / radius, 1.0)
             direction = mi.Vector3f(image.x * side, image.y * side, cosine)
             ray = dr.zeros(mi.Ray3f, dr.width(direction))
@@ -101,42 +95,6 @@ def register_sensor(mi: Any, dr: Any) -> None:
             return mi.ScalarBoundingBox3f()
 
         def to_string(self) -> str:
-            return f"Fisheye[{self.law}]"
+            return f"Fisheye[{self.law.name}]"
 
     mi.register_sensor(SENSOR, Fisheye)
-
-
-def _sine_cosine(dr: Any, mi: Any, sensor: Any, rho: Any) -> tuple[Any, Any]:
-    """sin and cos of theta(rho), each in the form that loses least in float32."""
-    if sensor.law == "orthogonal":
-        return rho, dr.safe_sqrt((1.0 - rho) * (1.0 + rho))
-    if sensor.law == "perspective":
-        cosine = dr.rsqrt(1.0 + rho * rho)
-        return rho * cosine, cosine
-    if sensor.law == "equidistance":
-        return dr.sincos(rho)
-    if sensor.law == "equisolid":
-        half = 0.5 * rho  # sin(theta / 2)
-        return 2.0 * half * dr.safe_sqrt((1.0 - half) * (1.0 + half)), 1.0 - 2.0 * half * half
-    if sensor.law == "stereographic":
-        half = 0.5 * rho  # tan(theta / 2)
-        scale = 1.0 / (1.0 + half * half)
-        return 2.0 * half * scale, (1.0 - half) * (1.0 + half) * scale
-    assert sensor.law == KANNALA_BRANDT
-    return dr.sincos(_invert_polynomial(dr, mi, sensor, rho))
-
-
-def _invert_polynomial(dr: Any, mi: Any, sensor: Any, rho: Any) -> Any:
-    """theta of the Kannala-Brandt polynomial: Newton's method kept inside a shrinking bracket."""
-    k1, k2, k3, k4 = sensor.coefficients
-    low, high = mi.Float(0.0), mi.Float(sensor.theta_max)
-    theta = dr.minimum(rho, sensor.theta_max)
-    for _ in range(INVERSION_STEPS):
-        t2 = theta * theta
-        value = theta * (1.0 + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4))))
-        slope = 1.0 + t2 * (3.0 * k1 + t2 * (5.0 * k2 + t2 * (7.0 * k3 + t2 * 9.0 * k4)))
-        excess = value - rho
-        low, high = dr.select(excess < 0.0, theta, low), dr.select(excess >= 0.0, theta, high)
-        proposal = theta - excess / slope
-        theta = dr.select((proposal >= low) & (proposal <= high), proposal, 0.5 * (low + high))
-    return theta

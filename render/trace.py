@@ -1,8 +1,10 @@
-"""Primary rays for chosen pixels, shaded by lookup.
+"""The light of a region of the picture: a cell for each pixel, and a grid of cells where edges cross a pixel.
 
-Only the pixels that an edge crosses need many samples: shading is a smooth map without noise, so elsewhere four give
-the pixel's mean. The subpixel positions of a pixel follow from its place in the picture and the frame's seed alone,
-so that a region has the bits of the whole picture.
+Without edges shading is smooth, and one cell gives a pixel's mean. There is no noise and no random number: a pixel's
+value follows from its place in the picture, so that a region has the bits of the whole picture.
+
+Nothing that changes from frame to frame is a literal of a kernel: three kernels serve all poses, regions and cameras
+of a lens.
 """
 
 from __future__ import annotations
@@ -12,67 +14,81 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eposit import Camera, Pose
 from render import backend
+from render.cell import MANY_EDGES, ONE_EDGE, SMOOTH, Board, look, uploaded
+from render.light import Light
+from render.rays import View, view_of
+from render.rim import uploaded_coverage
+from render.target import Target
 
-CHUNK = 1 << 24  # rays in flight: 64 MB for each float that a ray carries
-Pixels = NDArray[np.uint32]
+CHUNK = 1 << 23  # cells in flight; a cell takes 8 bytes
+ONE_EDGE_CELLS = 4  # a single straight edge needs one cell; four follow its bend and the light along it
 
 
 def trace(
-    scene: Any, sensor: Any, pixels: Pixels, picture: tuple[int, int], samples: int, seed: int
+    target: Target,
+    light: Light,
+    camera: Camera,
+    cam_from_obj: Pose,
+    region: tuple[int, int, int, int],
+    samples: int,
 ) -> NDArray[np.float32]:
-    """(n, 2) radiance and share of hits of (n,) pixels, the means over `samples` multijittered rays each.
+    """(height, width) mean radiance of the pixels of a region (x, y, width, height).
 
-    scene: from `lookup_scene`. sensor: over the whole picture. pixels: y * width + x. picture: width and height, px.
-    samples: a square number.
+    samples: cells of a pixel that several edges cross, a square number.
     """
-    per_chunk = max(1, CHUNK // samples)
-    parts = [
-        _trace_chunk(scene, sensor, pixels[i : i + per_chunk], picture, samples, seed)
-        for i in range(0, len(pixels), per_chunk)
-    ]
-    return np.concatenate(parts) if parts else np.zeros((0, 2), np.float32)
-
-
-def _trace_chunk(
-    scene: Any, sensor: Any, pixels: Pixels, picture: tuple[int, int], samples: int, seed: int
-) -> NDArray[np.float32]:
     mi, dr = backend.load(), backend.jit()
-    index = dr.arange(mi.UInt32, len(pixels) * samples)
-    pixel, sample = dr.gather(mi.UInt32, mi.UInt32(pixels), index // samples), index % samples
-    width, height = dr.opaque(mi.UInt32, picture[0]), dr.opaque(mi.UInt32, picture[1])
-    inner = _multijitter(dr, mi, pixel, sample, round(samples**0.5), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
-    corner = mi.Point2f(mi.Float(pixel % width), mi.Float(pixel // width))
-    position = (corner + inner) / mi.Point2f(mi.Float(width), mi.Float(height))
-    ray, _ = sensor.sample_ray(mi.Float(0.0), mi.Float(0.0), position, mi.Point2f(0.0))
-    radiance, hit = _shade(dr, mi, scene, ray)
-    # Sums over the contiguous block of a pixel's samples: no atomic additions, the same bits every time.
-    sums = [np.array(dr.block_sum(value, samples)) for value in (radiance, dr.select(hit, 1.0, 0.0))]
-    return (np.stack(sums, axis=1) / samples).astype(np.float32)
+    x, y, width, height = region
+    board, view = uploaded(target, light), view_of(camera, cam_from_obj)
+    background = dr.opaque(mi.Float, light.background)
+    corner = tuple(dr.opaque(mi.Int32, value) for value in (x, y, width))
+    x_px, y_px = _middle(dr.arange(mi.Int32, width * height), corner)
+    place = mi.UInt32(mi.Int32(y_px) * dr.opaque(mi.Int32, camera.width) + mi.Int32(x_px))
+    seen = dr.gather(mi.Float, uploaded_coverage(camera), place)
+    found = look(board, view, x_px, y_px, mi.Float(1.0))
+    picture = found.radiance + background * dr.maximum(seen - found.filled, 0.0)
+    crossed = dr.select((seen > 0.0) & (seen < 1.0), MANY_EDGES, dr.select(seen > 0.0, found.crossed, SMOOTH))
+    dr.eval(picture, crossed, seen)
+    for kind, cells in ((ONE_EDGE, min(samples, ONE_EDGE_CELLS)), (MANY_EDGES, samples)):
+        chosen = dr.compress(crossed == kind)
+        for begin in range(0, len(chosen), max(1, CHUNK // cells)):
+            part = dr.arange(mi.UInt32, min(max(1, CHUNK // cells), len(chosen) - begin))
+            pixels = dr.gather(mi.UInt32, chosen, part + dr.opaque(mi.UInt32, begin))
+            radiance, filled = _mean(board, view, _middle(mi.Int32(pixels), corner), cells)
+            behind = dr.maximum(dr.gather(mi.Float, seen, pixels) - filled, 0.0)
+            dr.scatter(picture, radiance + background * behind, pixels)
+    return np.array(picture).reshape(height, width)
 
 
-def _shade(dr: Any, mi: Any, scene: Any, ray: Any) -> tuple[Any, Any]:
-    """Reflectance times shading of what a ray hits first, and whether it hits; a back side is black."""
-    si = scene.ray_intersect(ray, mi.RayFlags.Minimal | mi.RayFlags.UV | mi.RayFlags.ShadingFrame, True)
-    hit = si.is_valid()
-    reflectance = si.bsdf().eval_diffuse_reflectance(si, hit)
-    shading = si.shape.eval_attribute_1("shading", si, hit)
-    return dr.select(hit & (si.wi.z > 0.0), reflectance[0] * shading, 0.0), hit
+def _mean(board: Board, view: View, middle: tuple[Any, Any], cells: int) -> tuple[Any, Any]:
+    """Mean radiance and mean share of the target of pixels, each divided into `cells`."""
+    mi, dr = backend.load(), backend.jit()
+    dr.eval(middle)
+    side = round(cells**0.5)
+    index = dr.arange(mi.UInt32, dr.width(middle) * cells)
+    pixel = index // cells
+    inner = index - pixel * cells
+    row = inner // side
+    column = inner - row * side
+    size = mi.Float(1.0 / side)
+    x_px = dr.gather(mi.Float, middle[0], pixel) + ((mi.Float(column) + 0.5) * size - 0.5)
+    y_px = dr.gather(mi.Float, middle[1], pixel) + ((mi.Float(row) + 0.5) * size - 0.5)
+    found = look(board, view, x_px, y_px, size)
+    dr.eval(found.radiance, found.filled)
+    # Sums over the contiguous block of a pixel's cells: no atomic additions, the same bits every time.
+    return tuple(dr.block_sum(value, cells) * (size * size) for value in (found.radiance, found.filled))
 
 
-def _multijitter(dr: Any, mi: Any, pixel: Any, sample: Any, side: int, seed: Any) -> Any:
-    """Positions in [0, 1)^2: one sample in each cell of a side x side grid and in each of side^2 rows and columns.
+def _middle(index: Any, corner: tuple[Any, Any, Any]) -> tuple[Any, Any]:
+    """Column and row in the picture, as floats, of pixels of a region, counted row by row.
 
-    Source:
-        Kensler 2013, Correlated multi-jittered sampling (Pixar technical memo 13-01).
+    corner: x, y and width of the region. The processor divides floats eight at a time and integers one by one; a
+    float quotient is off by one at most.
     """
-    key, other = mi.sample_tea_32(pixel, seed)
-    jitter_key, _ = mi.sample_tea_32(key, sample)
-    column, row = sample % side, sample // side
-    shuffled_row = mi.permute_kensler(row, side, key)
-    shuffled_column = mi.permute_kensler(column, side, other)
-    jitter_x = mi.sample_tea_float32(jitter_key, 0)
-    jitter_y = mi.sample_tea_float32(jitter_key, 1)
-    x = (mi.Float(column) + (mi.Float(shuffled_row) + jitter_x) / side) / side
-    y = (mi.Float(row) + (mi.Float(shuffled_column) + jitter_y) / side) / side
-    return mi.Point2f(x, y)
+    mi, dr = backend.load(), backend.jit()
+    x, y, width = corner
+    row = mi.Int32(mi.Float(index) / mi.Float(width))
+    column = index - row * width
+    row += dr.select(column >= width, 1, 0) - dr.select(column < 0, 1, 0)
+    return mi.Float(index - row * width + x), mi.Float(row + y)

@@ -30,7 +30,7 @@ def demo():
     for frame in plan(RECIPE):
         camera = frame.camera.true_camera()
         master = render_master(
-            TARGET, RECIPE.light, camera, frame.cam_from_obj, samples=RECIPE.samples, seed=frame.render_seed
+            TARGET, RECIPE.light, camera, frame.cam_from_obj, samples=RECIPE.sample_count(), seed=frame.render_seed
         )
         image = develop(master.full(camera), RECIPE.sensor)
         found.append((frame, image, camera.project(frame.cam_from_obj.apply(TARGET.points))))

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from datasets.errors import UserError
 from datasets.override import with_regime
 from datasets.plan import Stream, frame_count, plan, rng_for, shard_count
+from datasets.quality import QUALITIES
 from datasets.recipe import describe, load_recipe, parse_recipe, recipe_names, values
 from datasets.schema import MEANING, TABLES, dictionary
 from datasets.trajectory import Helix
@@ -97,6 +98,20 @@ def test_small_boards_have_four_points_of_their_own():
     small = text.replace("four = ", "# four = ") + "\n[target]\ncolumns = 5\nrows = 4\n"
     recipe = parse_recipe(small, "small")
     assert recipe.four_indices() == [0, 3, 8, 12]
+
+
+def test_a_quality_stands_for_its_samples():
+    _, text = load_recipe("smoke")
+    for name, quality in QUALITIES.items():
+        named = parse_recipe(text.replace('quality = "draft"', f'quality = "{name}"'), "named")
+        given = parse_recipe(text.replace('quality = "draft"', f"samples = {quality.samples}"), "given")
+        assert named.sample_count() == given.sample_count() == quality.samples
+        assert named.digest() == given.digest()
+    meaning = next(meaning for key, _, meaning in describe() if key == "quality")
+    assert all(f"{name} ({quality.samples} samples" in meaning for name, quality in QUALITIES.items())
+    assert parse_recipe(text.replace('quality = "draft"', "samples = 25"), "x").sample_count() == 25
+    with pytest.raises(UserError, match=r"key 'quality' is 'best'.*'draft', 'standard' or 'reference'"):
+        parse_recipe(text.replace('quality = "draft"', 'quality = "best"'), "x")
 
 
 def test_a_suggestion_is_made():

@@ -66,7 +66,12 @@ def _ours(recipe: Recipe, frame: Frame) -> tuple[float, float]:
     with tempfile.TemporaryDirectory() as folder:
         begin = time.perf_counter()
         master = render_master(
-            recipe.target, recipe.light, camera, frame.cam_from_obj, samples=recipe.samples, seed=frame.render_seed
+            recipe.target,
+            recipe.light,
+            camera,
+            frame.cam_from_obj,
+            samples=recipe.sample_count(),
+            seed=frame.render_seed,
         )
         write_master(master, camera, Path(folder) / "master.exr")
         image = develop(master.full(camera), recipe.sensor)
@@ -81,11 +86,11 @@ def _plain(recipe: Recipe, frame: Frame) -> None:
     """What a first script does: the whole picture, one lamp sample for each ray, independent samples."""
     mi = backend.load()
     camera = frame.camera.true_camera()
-    sensor = sensor_dict(camera, frame.cam_from_obj, (0, 0, camera.width, camera.height), recipe.samples)
-    sensor["sampler"] = {"type": "independent", "sample_count": recipe.samples}
+    sensor = sensor_dict(camera, frame.cam_from_obj, (0, 0, camera.width, camera.height), recipe.sample_count())
+    sensor["sampler"] = {"type": "independent", "sample_count": recipe.sample_count()}
     integrator = mi.load_dict({"type": "direct", "emitter_samples": 1, "bsdf_samples": 0, "hide_emitters": True})
     scene = reference_scene(recipe.target, recipe.light)
-    np.array(mi.render(scene, sensor=mi.load_dict(sensor), integrator=integrator, spp=recipe.samples, seed=0))
+    np.array(mi.render(scene, sensor=mi.load_dict(sensor), integrator=integrator, spp=recipe.sample_count(), seed=0))
 
 
 def _timed(call: Callable[[], None]) -> float:

@@ -1,0 +1,39 @@
+"""The lens's image circle: what share of each pixel the lens sees."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eposit import Camera
+from render import backend
+
+RIM_SAMPLES = 16  # subpixels along each side on the image circle's rim
+
+
+@functools.lru_cache(maxsize=8)
+def lens_coverage(camera: Camera) -> NDArray[np.float32]:
+    """(height, width) share of each pixel that the lens sees: 1 inside the image circle, 0 outside."""
+    rim = camera.law.rho_max
+    corner = np.hypot((camera.width + abs(camera.cx)) / camera.fx, (camera.height + abs(camera.cy)) / camera.fy)
+    if not np.isfinite(rim) or rim >= corner:
+        return np.ones((camera.height, camera.width), np.float32)
+    x, y = (np.arange(camera.width) - camera.cx) / camera.fx, (np.arange(camera.height) - camera.cy) / camera.fy
+    radius = np.hypot(x[None], y[:, None])
+    coverage = (radius <= rim).astype(np.float32)
+    pixel = 1.0 / min(camera.fx, camera.fy)
+    rows, columns = np.nonzero(np.abs(radius - rim) <= pixel)
+    sub = (np.arange(RIM_SAMPLES) + 0.5) / RIM_SAMPLES - 0.5
+    fine_x = x[columns, None, None] + sub[None, None, :] / camera.fx
+    fine_y = y[rows, None, None] + sub[None, :, None] / camera.fy
+    coverage[rows, columns] = np.mean(np.hypot(fine_x, fine_y) <= rim, axis=(1, 2))
+    return coverage
+
+
+@functools.lru_cache(maxsize=8)
+def uploaded_coverage(camera: Camera) -> Any:
+    """`lens_coverage`, row by row, as a Dr.Jit array."""
+    return backend.load().Float(lens_coverage(camera).ravel())
