@@ -24,6 +24,7 @@ START_LIMIT = 0.3  # of the local square: a fit that moves further has gone to a
 LIMIT_PX = 0.5  # largest distance of a corner from the map through the others
 LIMIT_SHARE = 0.03  # or this share of the local square, whichever is more
 BAD_SHARE = 0.1  # of the corners that may be inconsistent before the board is
+OWN_NOISE = 0.33  # share of a corner's own noise in what is stated for it; the rest is the board's median
 PRIOR_FREEDOM = 10.0  # degrees of freedom with which the pixels' own noise counts against the corners' scatter
 
 
@@ -80,7 +81,7 @@ def _fit(image: Grey, board: BoardMap, target: Target, shapes: Array, window: in
     reach = np.clip(1.0 - CLEAR_BLURS * shapes[:, BLUR, None] / lengths, LEAST_REACH, REACH)
     discs, disc_axes = _around_circle(board, target)
     stop = FIRST_STOP if window == FIRST_WINDOW_PX else STOP
-    fitted, covariance, _, converged = fit_corners(
+    fitted, covariance, noise, converged = fit_corners(
         image, starts, shapes, board.curvatures(at, jacobian), np.linalg.inv(jacobian), reach, window, discs,
         disc_axes, steps, stop,
     )  # fmt: skip
@@ -93,6 +94,8 @@ def _fit(image: Grey, board: BoardMap, target: Target, shapes: Array, window: in
         good &= converged if window == WINDOW_PX else True
     if not np.any(good):
         return Corners(points, covariance, good, np.nan, np.nan, board)
+    # A corner's own few pixels tell its noise to a tenth; weights that scatter so much would promise too much.
+    covariance *= (OWN_NOISE * noise + (1.0 - OWN_NOISE) * np.median(noise[good]))[:, None, None]
     blur, contrast = np.median(fitted[good, BLUR]), 2.0 * np.median(np.abs(fitted[good, CONTRAST]))
     return Corners(points, covariance, good, float(blur), float(contrast), board)
 

@@ -154,7 +154,7 @@ def fit_corners(
     disc_axes: Array,
     steps: int,
     stop: float,
-) -> tuple[Array, Array, NDArray[np.int64], Mask]:
+) -> tuple[Array, Array, Array, Mask]:
     """Fit every corner by Levenberg-Marquardt.
 
     image: (height, width) 8 bits. starts: (n, 2) px. shapes: (n, 9) where to start from; without a mean grey (NaN),
@@ -164,17 +164,17 @@ def fit_corners(
     in standard deviations of what is fitted, at which it has converged.
 
     Returns:
-        (n, 9) shapes with the corner in px of the image, (n, 2, 2) covariances, px^2, for the noise that the pixels
-        on the edges show, (n,) pixels used, (n,) whether it converged. NaN shapes where too few pixels are there.
+        (n, 9) shapes with the corner in px of the image, (n, 2, 2) covariances, px^2, for noise of one grey level, (n,)
+        variance of the noise that the pixels on the edges show, (n,) whether it converged. NaN where too few pixels
+        are there.
     """
     count, most = len(starts), (2 * window + 1) ** 2
     out, covariances = np.full((count, SHAPE), np.nan), np.full((count, 2, 2), np.nan)
-    used, converged = np.zeros(count, np.int64), np.zeros(count, np.bool_)
+    noises, converged = np.full(count, np.nan), np.zeros(count, np.bool_)
     x, y, grey, residual = np.empty(most), np.empty(most), np.empty(most), np.empty(most)
     jacobian, step, unit = np.empty((SHAPE, most)), np.empty(SHAPE), np.empty(SHAPE)
     for i in range(count):
         n = _gather(image, starts[i], inverses[i], reaches[i], window, discs, disc_axes, x, y, grey)
-        used[i] = n
         if n < LEAST_PIXELS:
             continue
         p, trial = out[i], shapes[i].copy()
@@ -213,7 +213,8 @@ def fit_corners(
             unit[k] = 1.0
             if not _solve(normal, unit, 0.0, step):
                 converged[i] = False
-            covariances[i, 0, k], covariances[i, 1, k] = noise * step[0], noise * step[1]
+            covariances[i, 0, k], covariances[i, 1, k] = step[0], step[1]
+        noises[i] = noise
         p[0] += starts[i, 0]
         p[1] += starts[i, 1]
-    return out, covariances, used, converged
+    return out, covariances, noises, converged
