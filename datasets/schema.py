@@ -119,7 +119,7 @@ ESTIMATES = pa.schema(
         _field(
             "covariance",
             pa.list_(pa.field("element", pa.float64()), 36),
-            "6 x 6, row by row: rotation vector on the left in the camera frame, rad; then t, mm. NaN where none is stated",
+            "6 x 6, row by row: rotation vector on the left in the camera frame, rad; then t, mm. NaN: none stated",
         ),
     ]
 )

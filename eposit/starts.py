@@ -13,6 +13,7 @@ from eposit.posit import COPLANAR_CONDITION, Start, centring_rotations, conditio
 START_TOL = 1e-3  # a start needs no more
 START_ITERATIONS = 50  # the median is 7; what takes longer has usually lost its way
 TRIANGLE_POSES = 2  # a triangle has up to four poses; under noise the right one is among the best two
+BOARD_RATIO = 0.02  # the same ratio, below which EPOSIT takes hundreds of iterations and is left out
 FLAT_RATIO = 0.2  # least over second spread of an object below which the planar start is tried
 RIM_ALLOWANCE = 0.01  # image points this fraction outside the lens's image circle are noise, not errors
 
@@ -35,7 +36,8 @@ def starts(points_in_obj: Array, bearings: Array) -> list[Start]:
     """Rough poses, one of which lies in the basin of the best pose; empty if the points cannot give any.
 
     EPOSIT's iteration diverges, or settles beside the truth, for about one in a hundred random objects; the poses of
-    a triangle hold the rest. Many points in a plane need a start that uses all of them, and its twin.
+    a triangle hold the rest. Many points in or near a plane, on which EPOSIT is slow at best, need a start that uses all
+    of them, and its twin.
     """
     _, _, spreads = plane_axes(points_in_obj)
     solid = condition(points_in_obj) <= COPLANAR_CONDITION
@@ -43,10 +45,11 @@ def starts(points_in_obj: Array, bearings: Array) -> list[Start]:
     if spreads[1] <= spreads[0] / COPLANAR_CONDITION or not (solid or many):
         return []
     found = [_poses(*pose) for pose in p3p_starts(points_in_obj, bearings, TRIANGLE_POSES)]
-    if solid:
+    flatness = spreads[2] / spreads[1] if many else np.inf
+    if solid and flatness > BOARD_RATIO:
         x, y, back = centred_points(bearings)
         found.insert(0, turn_back(back, posit(points_in_obj, x, y, START_TOL, START_ITERATIONS)))
-    if many and spreads[2] < FLAT_RATIO * spreads[1]:
+    if flatness < FLAT_RATIO:
         planar = _planar(points_in_obj, bearings)
         found += [planar, _poses(*mirror_twin(points_in_obj, planar.R, planar.t))]
     return found
