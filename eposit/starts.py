@@ -36,8 +36,8 @@ def starts(points_in_obj: Array, bearings: Array) -> list[Start]:
     """Rough poses, one of which lies in the basin of the best pose; empty if the points cannot give any.
 
     EPOSIT's iteration diverges, or settles beside the truth, for about one in a hundred random objects; the poses of
-    a triangle hold the rest. Many points in or near a plane, on which EPOSIT is slow at best, need a start that uses all
-    of them, and its twin.
+    a triangle hold the rest. Many points in or near a plane, on which EPOSIT is slow at best, need a start that uses
+    all of them, and its twin.
     """
     _, _, spreads = plane_axes(points_in_obj)
     solid = condition(points_in_obj) <= COPLANAR_CONDITION
