@@ -116,15 +116,17 @@ def test_the_map_goes_through_exact_corners_and_on(camera, pose):
 
 @pytest.mark.xfail(reason="at one pose in twenty the fit stops in a narrow valley between focal length and distance")
 def test_one_fit_arrives():
+    """Boards at any tilt up to 50 degrees about both axes, up to 60 degrees off the axis, 4 to 25 squares away."""
     rng, misses = np.random.default_rng(0), []
-    while len(misses) < 300:
-        R = Rotation.from_euler("xyz", rng.uniform([-40, -40, -180], [40, 40, 180]), degrees=True).as_matrix()
-        middle = rng.uniform([-6.0, -4.0, 5.0], [6.0, 4.0, 15.0])
-        points = (np.column_stack((CORNERS, np.zeros(54))) - [4.0, 2.5, 0.0]) @ R.T + middle
-        pixels = CAMERAS["orthogonal"](points)
-        if np.any(points[:, 2] < 0.3 * np.linalg.norm(points, axis=1)) or pixels.min() < 0.0 or np.any(pixels > SIZE):
-            continue
-        if np.any(points @ R[:, 2] < 0.2 * np.linalg.norm(points, axis=1)):  # seen from a grazing angle
+    while len(misses) < 400:
+        R = Rotation.from_euler("xyz", rng.uniform([-50, -50, -180], [50, 50, 180]), degrees=True).as_matrix()
+        theta, phi, distance = rng.uniform([0.0, 0.0, 4.0], [np.pi / 3, 2 * np.pi, 25.0])
+        towards = np.array([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
+        points = (np.column_stack((CORNERS, np.zeros(54))) - [4.0, 2.5, 0.0]) @ R.T + distance * towards
+        length, pixels = np.linalg.norm(points, axis=1), CAMERAS["orthogonal"](points)
+        if np.any(points @ R[:, 2] < 0.2 * length) or np.any(points[:, 2] < 0.26 * length):
+            continue  # seen from a grazing angle, or beyond 75 degrees
+        if pixels.min() < 0.0 or np.any(pixels > SIZE):
             continue
         board = BoardMap.fit(CORNERS, pixels, SIZE, np.ones(54))
         misses.append(np.linalg.norm(board(CORNERS) - pixels, axis=1).max())
@@ -240,7 +242,7 @@ def test_rays_meet_the_planes_where_the_map_sees_them(board):
     found = board.meet_planes(x, y, heights)
     assert found.shape == (3, 2, 9, 13)
     expected = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    for plane, height in zip(found, heights):
+    for plane, height in zip(found, heights, strict=True):
         # Newton's method stops at 1e-10 rad, which is 1e-7 px.
         np.testing.assert_allclose(board(plane.reshape(2, -1).T, height), expected, atol=1e-6)
 
