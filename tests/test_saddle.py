@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from pipelines.corners import REACH, STOP, WINDOW_PX
 from pipelines.saddle import BLUR, LEAST_PIXELS, SHAPE, fit_corners
 from tests.supersampled import digitised, picture, side
 
@@ -10,8 +11,7 @@ HALF = 12  # of a tile, px
 TILE = 2 * HALF + 1
 COLUMNS = 10  # tiles in a row of a picture
 SQUARE_PX = 20.0
-WINDOW, REACH = 10, 0.55  # as the detection's final fit
-STEPS, STOP_PX = 25, 3e-4
+STEPS = 40  # the detection takes up to 5, from its first map, and then 12: from near by
 MEAN, CONTRAST = 110.0, 85.0  # of an ordinary picture, grey values
 
 
@@ -89,8 +89,8 @@ def fitted(image, corners, scene, rng, start_px=0.3, **changed):
         **changed,
     }
     shapes, covariance, used, converged = fit_corners(
-        image, given["starts"], shapes, given["bends"], np.tile(inverse, (n, 1, 1)), given["reaches"], WINDOW,
-        given["discs"], given["disc_axes"], STEPS, STOP_PX,
+        image, given["starts"], shapes, given["bends"], np.tile(inverse, (n, 1, 1)), given["reaches"], WINDOW_PX,
+        given["discs"], given["disc_axes"], STEPS, STOP,
     )  # fmt: skip
     return shapes[:, :2] - middles - corners, shapes, covariance, used, converged
 
