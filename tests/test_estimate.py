@@ -1,8 +1,11 @@
 """Estimates and scores: which camera is assumed, whose noise is shared, what counts as a failure."""
 
 import dataclasses
+import shutil
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 import eposit
@@ -69,8 +72,6 @@ def test_wrong_settings_are_sentences(wrong):
 def test_poses_survive_their_columns():
     pose = helix_pose(10.0)
     R, t = np.stack((pose.R, np.full((3, 3), np.nan))), np.stack((pose.t, np.full(3, np.nan)))
-    import pyarrow as pa
-
     back = poses(pa.table(pose_columns(R, t)))
     np.testing.assert_allclose(back.R[0], pose.R, atol=1e-15)
     assert np.isnan(back.R[1]).all()
@@ -78,8 +79,6 @@ def test_poses_survive_their_columns():
 
 
 def test_points_by_frame_keeps_order():
-    import pyarrow as pa
-
     target = load_recipe("smoke")[0].target
     n = len(target.points)
     rows = pa.table({"frame_id": np.repeat([4, 5], n), "x_px": np.arange(2.0 * n), "y_px": -np.arange(2.0 * n)})
@@ -90,3 +89,52 @@ def test_points_by_frame_keeps_order():
 
 def test_methods_are_the_documented_ones():
     assert eposit.METHODS == ("best", "centred", "eposit", "posit")
+
+
+COMPONENTS = [f"{name}_normalised" for name in ("wx", "wy", "wz", "tx", "ty", "tz")]
+
+
+def normalised(root, variant):
+    """(n, 6) errors of poses over their stated standard deviations, from the scores of one kind of estimate."""
+    rows = pa.concat_tables(pq.read_table(path) for path in sorted((root / "scores").glob(f"{variant}-0*")))
+    assert set(rows["status"].to_pylist()) == {"ok"}
+    return np.stack([rows[name].to_numpy() for name in COMPONENTS], axis=1)
+
+
+@pytest.mark.parametrize("use", ["all", "four"])
+def test_covariances_say_how_far_noise_moves_a_pose(use, tiny, tmp_path, cli):
+    """From known noise through solver, columns and scores: each component errs as it states."""
+    root = tmp_path / "dataset"
+    shutil.copytree(tiny[1], root)
+    noise = ("--points", "truth+noise", "--noise-px", "0.1", "--draws", "400")
+    assert cli("estimate", root, *noise, "--use", use).code == 0
+    assert cli("score", root).code == 0
+    found = normalised(root, f"best-truth+0.1px-x400-exact-{use}")
+    assert found.shape == (800, 6)
+    # Two frames of 400 draws: an RMS of 1 is good to 1 / sqrt(1600) = 0.025; 0.1 is four of those. Noise of 0.1 px on a
+    # board of 200 px leaves the solution linear in it; more noise on four points would not.
+    rms = np.sqrt(np.mean(found**2, axis=0))
+    assert np.all((rms > 0.9) & (rms < 1.1)), rms
+    # A mean is good to 1 / sqrt(800) = 0.035; four of those.
+    assert np.abs(found.mean(axis=0)).max() < 0.14
+
+
+def test_detected_points_give_a_covariance_and_true_ones_none(tiny):
+    """True points have no noise to state: their covariance is NaN, not that of residuals at the floor of rounding."""
+    assert np.isnan(normalised(tiny[1], "best-truth-exact-all")).all()
+    for path in (tiny[1] / "estimates").glob("best-truth-exact-all-*"):
+        assert np.isnan(np.array(pq.read_table(path)["covariance"].to_pylist())).all()
+    detected = normalised(tiny[1], "best-detected-exact-all")
+    assert np.isfinite(detected).all()
+    # Twelve numbers: a wrong unit, degrees for rad or px for mm, would show as 50.
+    assert np.abs(detected).max() < 5.0
+
+
+def test_a_stored_covariance_is_that_of_six_components(tiny):
+    (path,) = (tiny[1] / "estimates").glob("best-detected-exact-all-00000-*")
+    stored = np.array(pq.read_table(path)["covariance"].to_pylist()).reshape(6, 6)
+    np.testing.assert_allclose(stored, stored.T, rtol=1e-9, atol=1e-18)  # as good as an inverse in double precision
+    np.linalg.cholesky(stored)
+    # The depth is what a camera tells worst.
+    assert stored[5, 5] > stored[3, 3]
+    assert stored[5, 5] > stored[4, 4]

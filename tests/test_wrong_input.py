@@ -373,6 +373,29 @@ CASES = RECIPES | {
     "unknown camera": (estimate("--camera", "wide"), "unknown camera 'wide'; choose one of exact"),
     "unknown use": (estimate("--use", "five"), "unknown use 'five'; choose one of four"),
     "unknown points": (estimate("--points", "seen"), "unknown points 'seen'; choose one of detected"),
+    "unknown detector": (
+        on_dataset("detect", "--detector", "edge-fitt"),
+        "unknown detector 'edge-fitt'; choose one of edge-fit, opencv-subpix, opencv-sb",
+    ),
+    "empty detector": (on_dataset("detect", "--detector", ""), "unknown detector ''; choose one of edge-fit"),
+    "detector in capitals": (on_dataset("detect", "--detector", "OPENCV-SB"), "unknown detector 'OPENCV-SB'"),
+    "unknown detector, estimate": (estimate("--detector", "opencv"), "unknown detector 'opencv'; choose one of edge"),
+    "unknown detector for true points": (
+        estimate("--points", "truth", "--detector", "opencv"),
+        "unknown detector 'opencv'; choose one of edge",
+    ),
+    "detector without detections": (
+        estimate("--detector", "opencv-subpix"),
+        "opencv-subpix-00000-of-00002.parquet is missing; run the detect stage",
+    ),
+    "detector without a shard of detections": (
+        damaged("detections", gone, "estimate", "--solver", "posit"),
+        "detections-00000-of-00002.parquet is missing; run the detect stage",
+    ),
+    "another detector before generate": (
+        lambda place: (*before_generate(place), "--detector", "opencv-sb"),
+        "is missing; run the generate stage first",
+    ),
     "negative noise": (estimate("--points", "truth+noise", "--noise-px", "-0.4"), "noise of -0.4 px is not usable"),
     "noise not a number": (estimate("--points", "truth+noise", "--noise-px", "nan"), "noise of nan px is not usable"),
     "zero draws": (estimate("--points", "truth+noise", "--draws", "0"), "0 draws are not usable"),
@@ -392,6 +415,7 @@ USAGE = {
     "unknown option": (lambda place: ("run", "smoke", "--fast", "--out", place.new()), "No such option: --fast"),
     "unknown command": (lambda place: ("rnu", "smoke"), "No such command 'rnu'"),
     "no folder": (lambda place: ("generate", "smoke"), "Missing option '--out'"),
+    "detector of a stage without one": (lambda place: ("score", place.new(), "--detector", "opencv-sb"), "--detector"),
     "workers not a number": (lambda place: ("run", "smoke", "--workers", "two", "--out", place.new()), "--workers"),
 }
 
