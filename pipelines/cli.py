@@ -156,24 +156,24 @@ def doctor() -> None:
         raise UserError("something that rendering needs is missing; see the lines marked MISSING")
 
 
-@app.command(epilog="Example: python -m pipelines bench demo --poses 3")
+@app.command(epilog="Example: python -m pipelines bench demo --only render --only solver --out bench.md")
 def bench(
     recipe: RecipeName = "demo",
-    poses: Annotated[int, typer.Option(min=1, help="Poses measured with each camera.")] = 3,
+    poses: Annotated[int, typer.Option(min=1, help="Poses measured with each camera.")] = 2,
+    only: Annotated[
+        list[str] | None,
+        typer.Option(help="A part: render, stages, frame, detection, solver or growth; may be given again."),
+    ] = None,
+    memory: Annotated[
+        int | None, typer.Option(min=1, help="Instead, generate and detect so many frames and tell the memory.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Write the table as Markdown, too.")] = None,
 ) -> None:
-    """Frames per second, detection included, against a plain script that renders full frames."""
+    """Speed as ratios measured side by side, and memory over a long run."""
     from datasets.recipe import load_recipe
-    from pipelines.bench.frames import measure, overall
-    from pipelines.doctor import versions
+    from pipelines.bench.command import bench as measure
 
-    rows = measure(load_recipe(recipe)[0], poses)
-    table = Table(box=None, title=versions(), title_justify="left")
-    for title in ("camera", "ours, s", "of which detection, s", "plain full frame, s", "ratio"):
-        table.add_column(title, justify="right")
-    for row in rows:
-        table.add_row(row.camera, *(f"{x:.3f}" for x in (row.ours_s, row.detect_s, row.plain_s)), f"{row.ratio:.1f}")
-    Console().print(table)
-    typer.echo(f"all cameras together: {overall(rows):.1f} of our frames in the time of one plain frame")
+    measure(load_recipe(recipe)[0], poses, only or [], memory, out)
 
 
 @app.command(epilog="Example: python -m pipelines recipes")

@@ -1,1 +1,1 @@
-"""Speed, as ratios of things measured side by side in one run. No test asserts a time."""
+"""Speed and memory, measured: every figure is a ratio of two things timed alternately in one run."""

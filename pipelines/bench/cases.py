@@ -1,0 +1,54 @@
+"""Frames and recipes that are measured."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from datasets.plan import Frame, plan
+from datasets.recipe import CameraSpec, Recipe
+from render.master import Master, render_master
+
+
+def chosen_poses(recipe: Recipe, poses: int) -> list[int]:
+    """Numbers of evenly spread poses."""
+    return sorted({int(i) for i in np.linspace(0, plan(recipe)[-1].pose_id, poses).round()})
+
+
+def chosen_frames(recipe: Recipe, poses: int) -> dict[str, list[Frame]]:
+    """Frames of each camera, by its name."""
+    chosen = chosen_poses(recipe, poses)
+    return {
+        camera.name: [frame for frame in plan(recipe) if frame.pose_id in chosen and frame.camera.name == camera.name]
+        for camera in recipe.cameras
+    }
+
+
+def master_of(recipe: Recipe, frame: Frame, samples: int | None = None) -> Master:
+    """A frame's linear light, at the recipe's samples if none are given."""
+    return render_master(
+        recipe.target,
+        recipe.light,
+        frame.camera.true_camera(),
+        frame.cam_from_obj,
+        samples=recipe.sample_count() if samples is None else samples,
+    )
+
+
+def scaled(recipe: Recipe, factor: float) -> Recipe:
+    """The recipe with `factor` times the pixels along each side and the same field of view."""
+    return recipe.model_copy(update={"cameras": tuple(_scaled_camera(camera, factor) for camera in recipe.cameras)})
+
+
+def _scaled_camera(camera: CameraSpec, factor: float) -> CameraSpec:
+    return replace(
+        camera,
+        fx=factor * camera.fx,
+        fy=factor * camera.fy,
+        cx=factor * (camera.cx + 0.5) - 0.5,
+        cy=factor * (camera.cy + 0.5) - 0.5,
+        width=round(factor * camera.width),
+        height=round(factor * camera.height),
+        nominal_f=None if camera.nominal_f is None else factor * camera.nominal_f,
+    )

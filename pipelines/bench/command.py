@@ -1,0 +1,64 @@
+"""Choose parts, measure them behind a progress bar, print one table and write it as Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import Progress
+
+from datasets.errors import UserError
+from datasets.recipe import Recipe
+from datasets.store import refused
+from pipelines.bench import finders, frames, growth, memory, rays, solver, whole
+from pipelines.bench.machine import facts, one_line
+from pipelines.bench.rows import Row, markdown, terminal
+
+Part = Callable[[Recipe, int], Iterator[Row]]
+
+
+def parts() -> dict[str, Part]:
+    """The parts by name, in the order of the table: a new one is a file with a `measure` and a line here."""
+    return {
+        "render": rays.measure,
+        "stages": whole.measure,
+        "frame": frames.measure,
+        "detection": finders.measure,
+        "solver": solver.measure,
+        "growth": growth.measure,
+    }
+
+
+def bench(recipe: Recipe, poses: int, only: Sequence[str], memory_frames: int | None, out: Path | None) -> None:
+    """Measure and show.
+
+    only: names of parts, all if empty. memory_frames: measure the memory over so many frames instead.
+    Raises:
+        UserError: an unknown part, or a file that cannot be written.
+    """
+    known = parts()
+    for name in only:
+        if name not in known:
+            raise UserError(f"unknown part {name!r}; choose one of {', '.join(known)}")
+    console, rows = Console(), list[Row]()
+    with Progress(console=console) as progress:
+        if memory_frames is not None:
+            bar = progress.add_task("memory", total=memory_frames)
+            rows += memory.measure(recipe, memory_frames, lambda done: progress.advance(bar, done))
+        else:
+            chosen = [name for name in known if not only or name in only]
+            bar = progress.add_task("", total=len(chosen))
+            for name in chosen:
+                progress.update(bar, description=name)
+                for row in known[name](recipe, poses):
+                    rows.append(row)
+                    progress.update(bar, description=f"{name}: {row.ours}")
+                progress.advance(bar)
+    console.print(terminal(rows, one_line()))
+    if out is not None:
+        try:
+            out.parent.mkdir(parents=True, exist_ok=True)
+            out.write_text(markdown(rows, facts()), encoding="utf-8")
+        except OSError as error:
+            raise refused(out, error) from error

@@ -1,0 +1,40 @@
+"""Times of calls that are made in turn, so that a busy machine is equally busy for all of them."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+REPEATS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Times:
+    """Seconds of one call."""
+
+    wall: float  # median
+    cpu: float  # least time of the processor, all threads of this process together
+
+    def __add__(self, other: Times) -> Times:
+        return Times(self.wall + other.wall, self.cpu + other.cpu)
+
+
+def in_turn(*calls: Callable[[], object], repeats: int = REPEATS, warm_up: bool = True) -> list[Times]:
+    """Times of each call, made A B A B after one round that does not count."""
+    if warm_up:
+        for call in calls:
+            call()
+    measured: list[list[tuple[float, float]]] = [[] for _ in calls]
+    for _ in range(repeats):
+        for call, found in zip(calls, measured, strict=True):
+            wall, cpu = time.perf_counter(), time.process_time()
+            call()
+            found.append((time.perf_counter() - wall, time.process_time() - cpu))
+    return [Times(statistics.median(w for w, _ in found), min(c for _, c in found)) for found in measured]
+
+
+def total(times: list[Times]) -> Times:
+    """The sum of several."""
+    return sum(times, Times(0.0, 0.0))

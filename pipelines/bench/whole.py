@@ -1,0 +1,75 @@
+"""End to end: every stage on a temporary dataset, against the 64 primary rays of the same frames."""
+
+from __future__ import annotations
+
+import functools
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from datasets.plan import plan, shard_count
+from datasets.recipe import Recipe
+from datasets.store import Dataset
+from pipelines import detect, estimate, generate, score
+from pipelines.bench.cases import chosen_poses
+from pipelines.bench.rays import NAME, primary_rays
+from pipelines.bench.rows import Row, compared
+from pipelines.bench.timing import Times, in_turn
+from pipelines.stages import RUN_SETTINGS
+
+PART = "end to end"
+
+
+def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
+    """One row for all stages together, and one for each."""
+    recipe = by_pose(recipe)
+    chosen = chosen_poses(recipe, poses)
+    frames = [frame for frame in plan(recipe) if frame.pose_id in chosen]
+    spent: dict[str, list[Times]] = {}
+    own, floor = in_turn(
+        functools.partial(run_stages, recipe, chosen, spent),
+        lambda: [primary_rays(recipe, frame) for frame in frames],
+    )
+    yield compared(PART, "all stages, a frame", own, NAME, floor, len(frames))
+    for name, times in spent.items():
+        wall, cpu = sorted(t.wall for t in times[1:]), min(t.cpu for t in times[1:])  # the first round warms up
+        yield compared(PART, f"of which {name}", Times(wall[len(wall) // 2], cpu), NAME, floor, len(frames))
+
+
+def by_pose(recipe: Recipe) -> Recipe:
+    """The recipe with one pose in a shard, so that a shard's number is the pose's."""
+    return recipe.model_copy(update={"shard_frames": len(recipe.cameras)})
+
+
+def run_stages(recipe: Recipe, poses: list[int], spent: dict[str, list[Times]] | None = None) -> None:
+    """What `run` does but the report, for some poses of a recipe from `by_pose`.
+
+    spent: takes the times of each stage.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        dataset = Dataset(Path(folder), recipe)
+
+        def estimate_shard(pose: int) -> None:
+            for setting in RUN_SETTINGS:
+                estimate.run_shard(dataset, pose, setting)
+
+        def score_shard(pose: int) -> None:
+            for setting in RUN_SETTINGS:
+                path = dataset.shard_path("estimates", pose, shard_count(recipe), setting.name)
+                score.run_shard(dataset, path)
+
+        steps: list[tuple[str, Callable[[int], None]]] = [
+            ("generate", lambda pose: generate.run_shard(dataset, pose)),
+            ("detect", lambda pose: detect.run_shard(dataset, pose)),
+            ("estimate", estimate_shard),
+            ("score", score_shard),
+        ]
+        for name, step in steps:
+            wall, cpu = time.perf_counter(), time.process_time()
+            for pose in poses:
+                step(pose)
+            dataset.write_manifest()
+            if spent is not None:
+                taken = Times(time.perf_counter() - wall, time.process_time() - cpu)
+                spent.setdefault(name, []).append(taken)
