@@ -162,18 +162,18 @@ def bench(
     poses: Annotated[int, typer.Option(min=1, help="Poses measured with each camera.")] = 2,
     only: Annotated[
         list[str] | None,
-        typer.Option(help="A part: render, stages, frame, detection, solver or growth; may be given again."),
+        typer.Option(help="A part: render, stages, frame, equal, detection, solver or growth; may be given again."),
     ] = None,
     memory: Annotated[
         int | None, typer.Option(min=1, help="Instead, generate and detect so many frames and tell the memory.")
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", help="Write the table as Markdown, too.")] = None,
+    regime: Regime = None,
 ) -> None:
     """Speed as ratios measured side by side, and memory over a long run."""
-    from datasets.recipe import load_recipe
     from pipelines.bench.command import bench as measure
 
-    measure(load_recipe(recipe)[0], poses, only or [], memory, out)
+    measure(_load(recipe, regime)[0], poses, only or [], memory, out)
 
 
 @app.command(epilog="Example: python -m pipelines recipes")
@@ -219,16 +219,23 @@ def _print_table(titles: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
     Console().print(table)
 
 
-def _claim(recipe: str, out: Path, regime: str | None, masters: Path | None, console: Console) -> Any:
+def _load(recipe: str, regime: str | None) -> tuple[Any, str]:
+    """A recipe and its text, with another regime if one is given."""
     from datasets.override import with_regime
-    from datasets.plan import plan
     from datasets.recipe import load_recipe, parse_recipe
-    from datasets.store import claim, open_dataset
 
     loaded, text = load_recipe(recipe)
-    if regime is not None:
-        text = with_regime(text, regime, recipe)
-        loaded = parse_recipe(text, f"recipe {recipe} with --regime {regime}")
+    if regime is None:
+        return loaded, text
+    text = with_regime(text, regime, recipe)
+    return parse_recipe(text, f"recipe {recipe} with --regime {regime}"), text
+
+
+def _claim(recipe: str, out: Path, regime: str | None, masters: Path | None, console: Console) -> Any:
+    from datasets.plan import plan
+    from datasets.store import claim, open_dataset
+
+    loaded, text = _load(recipe, regime)
     plan(loaded)
     if masters is not None:
         open_dataset(masters)  # before anything is written

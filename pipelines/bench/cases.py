@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from datasets.plan import Frame, plan
 from datasets.recipe import CameraSpec, Recipe
+from render.develop import Shot, develop
 from render.master import Master, render_master
 
 
@@ -34,6 +36,14 @@ def master_of(recipe: Recipe, frame: Frame, samples: int | None = None) -> Maste
         frame.cam_from_obj,
         samples=recipe.sample_count() if samples is None else samples,
     )
+
+
+def image_of(recipe: Recipe, frame: Frame, master: Master | None = None) -> NDArray[np.uint8]:
+    """The developed picture of a frame, of its own light if none is given."""
+    camera = frame.camera.true_camera()
+    light = master_of(recipe, frame) if master is None else master
+    shot = Shot(recipe.target, camera, frame.cam_from_obj, frame.rate, light.region, frame.sensor_seed)
+    return develop(light.full(camera), recipe.sensor, shot)
 
 
 def scaled(recipe: Recipe, factor: float) -> Recipe:

@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datasets.recipe import Recipe
-from pipelines.bench.cases import chosen_frames, master_of
+from pipelines.bench.cases import chosen_frames, image_of
 from pipelines.bench.rows import Row, compared
 from pipelines.bench.timing import Times, in_turn, total
 from pipelines.detection import detect_points
-from render.develop import develop
 from render.target import Target
 
 PART = "detection"
@@ -27,7 +26,7 @@ def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
     """Rows for each camera against each finder, with how many pictures each finds."""
     sums: list[list[Times]] = []
     for camera, frames in chosen_frames(recipe, poses).items():
-        images = [develop(master_of(recipe, frame).full(frame.camera.true_camera()), recipe.sensor) for frame in frames]
+        images = [image_of(recipe, frame) for frame in frames]
         calls = [_ours, classic, sector_based]
         times = [in_turn(*(functools.partial(call, image, recipe.target) for call in calls)) for image in images]
         sums.append([total(list(column)) for column in zip(*times, strict=True)])

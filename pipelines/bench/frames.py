@@ -8,21 +8,23 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from datasets.plan import Frame
 from datasets.recipe import Recipe
-from pipelines.bench.cases import chosen_frames, master_of
+from pipelines.bench.cases import chosen_frames, image_of, master_of
 from pipelines.bench.rows import Row, compared
 from pipelines.bench.timing import Times, in_turn, total
 from pipelines.detection import detect_points
 from render import backend
-from render.develop import develop, encode_png
+from render.develop import encode_png
 from render.master import Region, write_master
 from render.scene import reference_scene
 from render.sensor import sensor_dict
 
 PART = "frame"
 PLAIN_SAMPLES = 64
+Film = NDArray[np.float32]
 WARM_UP: Region = (0, 0, 16, 16)  # compiles the plain kernel, which serves any region
 _NAME = f"full picture, Mitsuba direct, {PLAIN_SAMPLES} rays"
 
@@ -40,35 +42,41 @@ def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
 
 def _sums(recipe: Recipe, frames: list[Frame]) -> list[Times]:
     """Ours and the plain one, summed over frames: the plain one takes seconds, so that once is enough."""
-    _ours(recipe, frames[0])
-    _plain(recipe, frames[0], WARM_UP)
+    frame_of_ours(recipe, frames[0])
+    plain(recipe, frames[0], region=WARM_UP)
     times = [
         in_turn(
-            functools.partial(_ours, recipe, frame), functools.partial(_plain, recipe, frame), repeats=1, warm_up=False
+            functools.partial(frame_of_ours, recipe, frame),
+            functools.partial(plain, recipe, frame),
+            repeats=1,
+            warm_up=False,
         )
         for frame in frames
     ]
     return [total(list(column)) for column in zip(*times, strict=True)]
 
 
-def _ours(recipe: Recipe, frame: Frame) -> None:
+def frame_of_ours(recipe: Recipe, frame: Frame) -> None:
     """Everything that a frame of a dataset costs, one after the other."""
     camera = frame.camera.true_camera()
     with tempfile.TemporaryDirectory() as folder:
         master = master_of(recipe, frame)
         write_master(master, camera, Path(folder) / "master.exr")
-        image = develop(master.full(camera), recipe.sensor)
+        image = image_of(recipe, frame, master)
         encode_png(image)
         detect_points(image, recipe.target)
 
 
-def _plain(recipe: Recipe, frame: Frame, region: Region | None = None) -> None:
-    """What a first script does: the whole picture, one lamp sample for each ray, independent samples."""
+def plain(recipe: Recipe, frame: Frame, samples: int = PLAIN_SAMPLES, region: Region | None = None) -> Film:
+    """What a first script does: the whole picture, one lamp sample for each ray, independent samples.
+
+    region: a part of the picture instead. Returns (height, width, 2): radiance and share of hits.
+    """
     mi = backend.load()
     camera = frame.camera.true_camera()
     region = (0, 0, camera.width, camera.height) if region is None else region
-    sensor = sensor_dict(camera, frame.cam_from_obj, region, PLAIN_SAMPLES)
-    sensor["sampler"] = {"type": "independent", "sample_count": PLAIN_SAMPLES}
+    sensor = sensor_dict(camera, frame.cam_from_obj, region, samples)
+    sensor["sampler"] = {"type": "independent", "sample_count": samples}
     integrator = mi.load_dict({"type": "direct", "emitter_samples": 1, "bsdf_samples": 0, "hide_emitters": True})
     scene = reference_scene(recipe.target, recipe.light)
-    np.array(mi.render(scene, sensor=mi.load_dict(sensor), integrator=integrator, spp=PLAIN_SAMPLES, seed=0))
+    return np.array(mi.render(scene, sensor=mi.load_dict(sensor), integrator=integrator, spp=samples, seed=0))

@@ -13,6 +13,7 @@ from datasets.store import Dataset
 from pipelines import detect, generate
 from pipelines.bench.cases import scaled
 from pipelines.bench.rows import Row, noted
+from pipelines.detection import Detector
 
 PART = "memory"
 SETTLED = 200  # frames after which kernels, maps and pools are all there
@@ -31,7 +32,7 @@ def measure(recipe: Recipe, frames: int, advance: Callable[[int], None] = lambda
             dataset = Dataset(Path(folder), small)
             for index in range(shard_count(small)):
                 generate.run_shard(dataset, index)
-                detect.run_shard(dataset, index)
+                detect.run_shard(dataset, index, detector=Detector.EDGE_FIT)
                 made = min(small.shard_frames, frame_count(small) - index * small.shard_frames)
                 done += made
                 advance(made)

@@ -16,9 +16,11 @@ from pipelines.bench.cases import chosen_poses
 from pipelines.bench.rays import NAME, primary_rays
 from pipelines.bench.rows import Row, compared
 from pipelines.bench.timing import Times, in_turn
-from pipelines.stages import RUN_SETTINGS
+from pipelines.detection import Detector
+from pipelines.estimate import Setting
 
 PART = "end to end"
+SETTING = Setting()
 
 
 def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
@@ -43,7 +45,7 @@ def by_pose(recipe: Recipe) -> Recipe:
 
 
 def run_stages(recipe: Recipe, poses: list[int], spent: dict[str, list[Times]] | None = None) -> None:
-    """What `run` does but the report, for some poses of a recipe from `by_pose`.
+    """Generate, detect, estimate with our solver, score, write: some poses of a recipe from `by_pose`.
 
     spent: takes the times of each stage.
     """
@@ -51,17 +53,14 @@ def run_stages(recipe: Recipe, poses: list[int], spent: dict[str, list[Times]] |
         dataset = Dataset(Path(folder), recipe)
 
         def estimate_shard(pose: int) -> None:
-            for setting in RUN_SETTINGS:
-                estimate.run_shard(dataset, pose, setting)
+            estimate.run_shard(dataset, pose, SETTING)
 
         def score_shard(pose: int) -> None:
-            for setting in RUN_SETTINGS:
-                path = dataset.shard_path("estimates", pose, shard_count(recipe), setting.name)
-                score.run_shard(dataset, path)
+            score.run_shard(dataset, dataset.shard_path("estimates", pose, shard_count(recipe), SETTING.name))
 
         steps: list[tuple[str, Callable[[int], None]]] = [
             ("generate", lambda pose: generate.run_shard(dataset, pose)),
-            ("detect", lambda pose: detect.run_shard(dataset, pose)),
+            ("detect", lambda pose: detect.run_shard(dataset, pose, detector=Detector.EDGE_FIT)),
             ("estimate", estimate_shard),
             ("score", score_shard),
         ]
