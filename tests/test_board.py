@@ -59,6 +59,16 @@ def test_the_order_is_the_boards_own_at_any_angle(angle):
     assert worst(found, truth) < 1.5
 
 
+@pytest.mark.parametrize("rows", [1, -1])
+@pytest.mark.parametrize("columns", [1, -1])
+def test_any_order_of_a_finder_becomes_the_boards(rows, columns, monkeypatch):
+    """From any corner, and turning the other way too."""
+    image, truth = drawn(26.0, 30)
+    given = truth.reshape(6, 9, 2)[::rows, ::columns].reshape(-1, 2)
+    monkeypatch.setattr("pipelines.board.FINDERS", {"other": lambda image, inner: given})
+    np.testing.assert_array_equal(find_board(image, TARGET).corners_px, truth)
+
+
 @pytest.mark.parametrize("angle", [0, 100, 180, 250])
 def test_the_sector_based_finder_alone_orders_likewise(angle):
     image, truth = drawn(26.0, angle)

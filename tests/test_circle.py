@@ -160,8 +160,11 @@ def test_noise_moves_it_as_far_as_it_states(drawn, name):
     assert 0.8 < np.sqrt(np.mean(np.square(normalised))) < 1.35
 
 
+WRONG = {"absent": {"disc": None}, "aside": {"moved": 0.14}, "far aside": {"moved": 0.35}, "pale": {"disc": 160.0}}
+
+
 @pytest.mark.parametrize("name", VIEWS)
-@pytest.mark.parametrize("wrong", [{"disc": None}, {"moved": 0.35}, {"disc": 160.0}], ids=["absent", "moved", "pale"])
+@pytest.mark.parametrize("wrong", WRONG.values(), ids=WRONG)
 def test_no_disc_where_the_board_puts_it_is_none(name, wrong):
     """Not there; so far aside that it is none of this board's; or too pale to be a circle of black."""
     image, camera = board_with(name, **wrong)

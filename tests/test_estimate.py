@@ -124,6 +124,8 @@ def test_detected_points_give_a_covariance_and_true_ones_none(tiny):
     assert np.isnan(normalised(tiny[1], "best-truth-exact-all")).all()
     for path in (tiny[1] / "estimates").glob("best-truth-exact-all-*"):
         assert np.isnan(np.array(pq.read_table(path)["covariance"].to_pylist())).all()
+    # A linear solver does not weigh its points: their covariances do not tell its pose's.
+    assert np.isnan(normalised(tiny[1], "eposit-detected-exact-four")).all()
     detected = normalised(tiny[1], "best-detected-exact-all")
     assert np.isfinite(detected).all()
     # Twelve numbers: a wrong unit, degrees for rad or px for mm, would show as 50.

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipelines.corners import REACH, STOP, WINDOW_PX
-from pipelines.saddle import BLUR, LEAST_PIXELS, SHAPE, fit_corners
+from pipelines.saddle import BLUR, SHAPE, fit_corners
 from tests.supersampled import digitised, picture, side
 
 HALF = 12  # of a tile, px
@@ -88,11 +88,11 @@ def fitted(image, corners, scene, rng, start_px=0.3, **changed):
         "disc_axes": np.eye(2),
         **changed,
     }
-    shapes, covariance, used, converged = fit_corners(
+    shapes, covariance, noise, converged = fit_corners(
         image, given["starts"], shapes, given["bends"], np.tile(inverse, (n, 1, 1)), given["reaches"], WINDOW_PX,
         given["discs"], given["disc_axes"], STEPS, STOP,
     )  # fmt: skip
-    return shapes[:, :2] - middles - corners, shapes, covariance, used, converged
+    return shapes[:, :2] - middles - corners, shapes, covariance * noise[:, None, None], noise, converged
 
 
 def whitened(error, covariance):
@@ -116,6 +116,8 @@ def test_a_corner_is_found_with_the_covariance_it_states(name):
     found = [fitted(digitised(image, rng, 2.0), corners, scene, rng) for _ in range(18)]
     normalised = np.concatenate([whitened(error, covariance) for error, _, covariance, _, _ in found])
     assert np.all(np.concatenate([converged for *_, converged in found]))
+    # Variance 4 and a twelfth of rounding; 250 pixels tell it to a tenth, 360 corners their mean to a hundredth.
+    assert 3.6 < np.mean([noise for _, _, _, noise, _ in found]) < 4.6
     assert 0.9 < normalised.std() < 1.1
     assert np.abs(normalised.mean(axis=0)).max() < 0.21
 
@@ -138,24 +140,24 @@ def test_too_few_pixels_give_nan():
     reaches = np.full((10, 2), REACH)
     reaches[0] = 0.1  # two pixels along both axes
     discs = np.array([[HALF + TILE * 1.0, HALF]])
-    error, shapes, covariance, used, converged = fitted(
+    error, shapes, covariance, noise, converged = fitted(
         image, corners, scene, rng, reaches=reaches, discs=discs, disc_axes=np.eye(2) / 13.0
     )
     # Of a disc of 13 px around a window of 10 nothing is left; it does not touch the other tiles' windows.
     lost = np.array([True, True] + [False] * 8)
-    np.testing.assert_array_equal(used < LEAST_PIXELS, lost)
+    np.testing.assert_array_equal(np.isnan(noise), lost)
     assert np.isnan(shapes[lost]).all()
     assert np.isnan(covariance[lost]).all()
     assert not np.any(converged[lost])
     assert np.all(converged[~lost])
     assert np.linalg.norm(error[~lost], axis=1).max() < ELSEWHERE_PX
 
-    cut = np.ascontiguousarray(image[HALF + 8 :])  # the first row of corners lies eight pixels above this picture
-    starts = np.array([[HALF + TILE * i, -8.0] for i in range(10)])
-    _, shapes, _, used, converged = fitted(cut, corners, scene, rng, starts=starts)
-    assert np.all(used < 2 * LEAST_PIXELS)
-    assert np.isnan(shapes[used < LEAST_PIXELS]).all()
-    assert not np.any(converged[used < LEAST_PIXELS])
+    # The first row of corners lies ten pixels above this picture: of each window two or three pixels are left.
+    cut = np.ascontiguousarray(image[HALF + 10 :])
+    starts = np.array([[HALF + TILE * i, -10.0] for i in range(10)])
+    _, shapes, covariance, noise, converged = fitted(cut, corners, scene, rng, starts=starts)
+    assert all(np.isnan(value).all() for value in (shapes, covariance, noise))
+    assert not np.any(converged)
 
 
 def test_pixels_on_a_disc_take_no_part():
@@ -167,8 +169,12 @@ def test_pixels_on_a_disc_take_no_part():
     y, x = np.mgrid[0 : image.shape[0], 0 : image.shape[1]]
     image[np.hypot(x - centre[0], y - centre[1]) < 4.0] = 10
     with_disc, *_ = fitted(image, corners, scene, rng)
-    without, _, _, used, converged = fitted(image, corners, scene, rng, discs=centre[None], disc_axes=np.eye(2) / 4.0)
+    without, _, covariance, noise, converged = fitted(
+        image, corners, scene, rng, discs=centre[None], disc_axes=np.eye(2) / 4.0
+    )
     assert np.linalg.norm(with_disc[3]) > 0.05
     assert np.all(converged)
-    assert used[3] < used[4] - 30
+    # Fewer pixels tell less: what one grey level of noise does to this corner is more than to the others.
+    spread = np.trace(covariance, axis1=1, axis2=2) / noise
+    assert spread[3] > 1.1 * spread[4]
     assert np.linalg.norm(without, axis=1).max() < ELSEWHERE_PX
