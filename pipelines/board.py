@@ -21,7 +21,7 @@ ENLARGEMENT = 3.0  # the classic finder needs squares of about 10 px; tilted one
 LEAST_ENLARGEMENT, MOST_PIXELS = 1.3, 8e6  # of an enlarged region; larger ones take seconds
 CLASSIC_FLAGS = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
 SECTOR_FLAGS = cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_EXHAUSTIVE
-UNCHECKED_PIXELS = 6e5  # up to which the sector-based finder may try everything
+UNCHECKED_PIXELS = 6e5  # up to which a finder may try everything
 DECIMATION = 4  # of the picture in which texture is looked for
 REGION_MARGIN_PX = 16
 LEAST_GRADIENT = 16  # grey values between neighbours that count as texture
@@ -56,7 +56,8 @@ def find_sector_based(image: Grey, target: Target) -> Found | None:
 
 def _classic(image: Grey, inner: tuple[int, int]) -> Array | None:
     part, offset = _region_of(image)
-    found, corners = cv2.findChessboardCorners(part, inner, flags=CLASSIC_FLAGS)
+    flags = CLASSIC_FLAGS | (cv2.CALIB_CB_FAST_CHECK if part.size > UNCHECKED_PIXELS else 0)
+    found, corners = cv2.findChessboardCorners(part, inner, flags=flags)
     return corners + offset if found else None
 
 
@@ -68,7 +69,7 @@ def _whole(image: Grey, inner: tuple[int, int]) -> Array | None:
 def _enlarged(image: Grey, inner: tuple[int, int]) -> Array | None:
     part, offset = _region_of(image)
     scale = min(ENLARGEMENT, float(np.sqrt(MOST_PIXELS / part.size)))
-    if scale < LEAST_ENLARGEMENT:
+    if scale < LEAST_ENLARGEMENT or not _worth_trying(part, inner):
         return None
     large = cv2.resize(part, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
     found, corners = cv2.findChessboardCorners(large, inner, flags=CLASSIC_FLAGS)
@@ -78,8 +79,7 @@ def _enlarged(image: Grey, inner: tuple[int, int]) -> Array | None:
 
 def _sector_based(image: Grey, inner: tuple[int, int]) -> Array | None:
     part, offset = _region_of(image)
-    # The finder would take a minute for a large picture of noise; the check misses small and tilted boards.
-    if part.size > UNCHECKED_PIXELS and not cv2.checkChessboard(part, inner):
+    if not _worth_trying(part, inner):
         return None
     found, corners = cv2.findChessboardCornersSB(np.ascontiguousarray(part), inner, flags=SECTOR_FLAGS)
     return corners + offset if found else None
@@ -91,6 +91,11 @@ FINDERS: dict[str, Callable[[Grey, tuple[int, int]], Array | None]] = {
     "enlarged": _enlarged,
     "sector": _sector_based,
 }
+
+
+def _worth_trying(part: Grey, inner: tuple[int, int]) -> bool:
+    """Whether to search: a large picture of noise takes a minute, OpenCV's check, which misses small boards, does not."""
+    return part.size <= UNCHECKED_PIXELS or bool(cv2.checkChessboard(part, inner))
 
 
 def _region_of(image: Grey) -> tuple[Grey, Array]:

@@ -162,7 +162,9 @@ def bench(
     poses: Annotated[int, typer.Option(min=1, help="Poses measured with each camera.")] = 2,
     only: Annotated[
         list[str] | None,
-        typer.Option(help="A part: render, stages, frame, equal, detection, solver or growth; may be given again."),
+        typer.Option(
+            help="A part: render, stages, profile, frame, equal, detection, solver or growth; may be given again."
+        ),
     ] = None,
     memory: Annotated[
         int | None, typer.Option(min=1, help="Instead, generate and detect so many frames and tell the memory.")

@@ -14,7 +14,7 @@ from render.target import Target
 
 FIRST_WINDOW_PX, WINDOW_PX = 5, 10  # half side of the pixels that the first and the final fit may use
 FIRST_STEPS, STEPS = 5, 12
-FIRST_STOP, STOP = 0.5, 0.02  # steps, in standard deviations, at which a fit has converged
+FIRST_STOP, STOP = 0.5, 0.1  # steps, in standard deviations, at which a fit has converged
 START_BLUR_PX = 0.8
 REACH, LEAST_REACH = 0.55, 0.25  # squares from the corner; at most this far, at least this far
 CLEAR_BLURS = 2.6  # blurs to keep between a fit's pixels and the next edge

@@ -193,7 +193,8 @@ def fit_corners(
             if cost < 0.0 or new <= cost:
                 p[:] = trial
                 cost, damping = new, 0.1 * damping
-                normal, right = np.dot(rows, rows.T), np.dot(rows, left)
+                whole = np.ascontiguousarray(rows)
+                normal, right = np.dot(whole, whole.T), np.dot(whole, left)
                 told = rows[0] ** 2 + rows[1] ** 2  # what a pixel tells of the position
                 noise = np.sum(told * left**2) / max(np.sum(told), 1e-300) * n / (n - SHAPE)
             else:

@@ -13,7 +13,7 @@ from pipelines import freelens
 FOCAL_SHARES = (0.2, 0.3, 0.45, 0.7, 1.1, 2.0)  # focal lengths to start from, as shares of the picture's width
 WIDEST_RAD = 2.2  # largest angle of a ray that a start may give a corner
 START_CORNERS = 16  # that a start is worked out from
-FIT_STEPS = 60
+FIT_STEPS = 100
 FREE = np.array([0.0, 2e-2, 100.0, 100.0, 0.3, 0.3, 0.3])  # how far a lens may lie from the start: see `freelens`
 HOLD_SHARE = 1e-6  # weight of that against one pixel of one corner: it decides only what nothing else does
 FIRM_HOLD = 1.0

@@ -11,7 +11,7 @@ from rich.progress import Progress
 from datasets.errors import UserError
 from datasets.recipe import Recipe
 from datasets.store import refused
-from pipelines.bench import equal, finders, frames, growth, memory, rays, solver, whole
+from pipelines.bench import equal, finders, frames, growth, memory, profile, rays, solver, whole
 from pipelines.bench.machine import facts, one_line
 from pipelines.bench.rows import Row, markdown, terminal
 
@@ -24,6 +24,7 @@ def parts() -> dict[str, Part]:
         "render": rays.measure,
         "stages": whole.measure,
         "frame": frames.measure,
+        "profile": profile.measure,
         "equal": equal.measure,
         "detection": finders.measure,
         "solver": solver.measure,

@@ -1,0 +1,84 @@
+"""Where the time of one frame goes, step by step, each beside the least that the step has to do."""
+
+from __future__ import annotations
+
+import functools
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+import eposit
+from datasets.plan import Frame
+from datasets.recipe import Recipe
+from pipelines.bench.cases import chosen_frames, image_of, master_of
+from pipelines.bench.rays import NAME, primary_rays
+from pipelines.bench.rows import Row, compared
+from pipelines.bench.timing import in_turn
+from pipelines.board import CLASSIC_FLAGS, find_board, textured_region
+from pipelines.circle import find_circle
+from pipelines.corners import refine_corners
+from pipelines.detection import CIRCLE_CLEARANCE, detect_points
+from pipelines.surface import BoardMap, grid
+from render.develop import decode_png, encode_png
+from render.master import write_master
+
+PART = "profile"
+Call = Callable[[], Any]
+
+
+def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
+    """Rows for the first pose through the recipe's last camera; `poses` does not matter."""
+    frame = chosen_frames(recipe, 1)[recipe.cameras[-1].name][0]
+    with tempfile.TemporaryDirectory() as folder:
+        for name, call, floor_name, floor in _steps(recipe, frame, Path(folder)):
+            own, that = in_turn(call, floor, repeats=7)
+            yield compared(PART, f"{frame.camera.name}: {name}", own, floor_name, that)
+
+
+def _steps(recipe: Recipe, frame: Frame, folder: Path) -> Iterator[tuple[str, Call, str, Call]]:
+    camera, target = frame.camera.true_camera(), recipe.target
+    master = master_of(recipe, frame)
+    picture, image = master.full(camera), image_of(recipe, frame, master)
+    data = encode_png(image)
+    copied = functools.partial(np.copy, image)
+    raw = functools.partial((folder / "raw").write_bytes, master.radiance.tobytes())
+    exr = functools.partial(write_master, master, camera, folder / "master.exr")
+    yield "render", functools.partial(master_of, recipe, frame), NAME, functools.partial(primary_rays, recipe, frame)
+    yield "write the master as EXR", exr, "write its bytes", raw
+    blur = functools.partial(cv2.GaussianBlur, picture, (9, 9), 0.7)
+    yield "develop", functools.partial(image_of, recipe, frame, master), "one gaussian blur of the picture", blur
+    yield "encode PNG", functools.partial(encode_png, image), "copy the picture", copied
+    yield "decode PNG", functools.partial(decode_png, data), "copy the picture", copied
+    yield from _detection(image, target)
+    found = detect_points(image, target)
+    ok = found.status == "ok"
+    solve = functools.partial(
+        eposit.solve, target.points[ok], found.points_px[ok], camera, sigma_px=found.covariance_px2[ok]
+    )
+    project = functools.partial(camera.project, frame.cam_from_obj.apply(target.points))
+    yield "solve, all points", solve, "project the points once", project
+
+
+def _detection(image: Any, target: Any) -> Iterator[tuple[str, Call, str, Call]]:
+    x, y, width, height = textured_region(image)
+    part = image[y : y + height, x : x + width]
+    finder = functools.partial(cv2.findChessboardCorners, part, target.inner, flags=CLASSIC_FLAGS)
+    yield "find the board", functools.partial(find_board, image, target), "OpenCV's finder on its region", finder
+    board = find_board(image, target)
+    if board is None:
+        return
+    at, size = grid(target.inner), (image.shape[1], image.shape[0])
+    clear = np.linalg.norm(at - target.circle_centre[:2] / target.square_mm, axis=1) > CIRCLE_CLEARANCE
+    rough = functools.partial(BoardMap.fit_rough, at, board.corners_px, size, clear)
+    start = board.corners_px.astype(np.float32).reshape(-1, 1, 2)
+    stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 40, 1e-3)
+    yield "map from board to image", rough, "its slopes once", functools.partial(rough().slopes, at)
+    subpix = lambda: cv2.cornerSubPix(image, start.copy(), (5, 5), (-1, -1), stop)  # noqa: E731
+    yield "corners", functools.partial(refine_corners, image, rough(), target), "cv2.cornerSubPix", subpix
+    corners = refine_corners(image, rough(), target)
+    circle = functools.partial(find_circle, image, corners.board, corners.blur_px, corners.contrast, target)
+    yield "circle", circle, "cv2.cornerSubPix", subpix
