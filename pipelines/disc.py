@@ -27,7 +27,6 @@ SIZE, SOFTNESS, CONTRAST_FROM, CONTRAST_TO = 2, 5, 7, 6
 STEPS_BACK = np.array([1e-3, 1e-3, 1e-3, 1e-2, 1e-2, 3e-3])  # for differences
 FURTHEST_STEP = np.array([0.15, 0.15, 0.02, 0.15, 0.15, 0.05])  # in one iteration
 FURTHEST_SHADOW, SOFTNESS_LIMITS = 1.2, (0.01, 0.6)
-FULL_STEP = 1e-2  # damping up to which a step is as long as it would be without
 ROUNDING = 1.0 / 12.0  # variance of a grey value that was rounded: no picture is better known
 
 
@@ -157,7 +156,7 @@ def fit_disc(
         for k in range(SHAPE):
             damped[k, k] += damping * normal[k, k]
         step = np.linalg.solve(damped, right)
-        if damping <= FULL_STEP and np.dot(right, step) <= stop * stop * noise:
+        if np.dot(right, step) <= stop * stop * noise:
             p[:SHAPE] += step[:SHAPE]
             converged = True
             break

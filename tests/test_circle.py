@@ -140,8 +140,8 @@ def test_what_is_found_is_the_centre_not_the_centroid(drawn, name):
     assert np.linalg.norm(circle.centre_px - truth) < 0.02
 
 
-# Largest RMS of normalised errors. Near by, the shadow hides under the disc; what the model of its rim is off then weighs
-# as much as the noise (README, "Where it stops"). Measured 1.2, 1.1 and 1.7.
+# Largest RMS of normalised errors. Near by, the shadow hides under the disc, and what the model of its rim is off
+# weighs as much as the noise (README, "Where it stops"). Measured 1.2, 1.1 and 1.7.
 HONEST = {"far": 1.35, "tilted": 1.35, "near": 2.0}
 
 

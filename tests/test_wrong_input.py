@@ -386,7 +386,7 @@ CASES = RECIPES | {
     ),
     "detector without detections": (
         estimate("--detector", "opencv-subpix"),
-        "opencv-subpix-00000-of-00002.parquet is missing; run the detect stage",
+        "opencv-subpix-00000-of-00002.parquet is missing; run the detect --detector opencv-subpix stage",
     ),
     "detector without a shard of detections": (
         damaged("detections", gone, "estimate", "--solver", "posit"),
