@@ -23,6 +23,7 @@ HIDDEN_PARALLAX = 0.3  # squares: a larger one is an ambiguous map's invention
 START_LIMIT = 0.3  # of the local square: a fit that moves further has gone to another corner
 LIMIT_PX = 0.5  # largest distance of a corner from the map through the others
 LIMIT_SHARE = 0.03  # or this share of the local square, whichever is more
+LIMIT_SPREADS, MOST_SHARE = 4.0, 0.15  # or so many median distances, up to this share of the local square
 BAD_SHARE = 0.1  # of the corners that may be inconsistent before the board is
 OWN_NOISE = 0.33  # share of a corner's own noise in what is stated for it; the rest is the board's median
 PRIOR_FREEDOM = 10.0  # degrees of freedom with which the pixels' own noise counts against the corners' scatter
@@ -125,14 +126,16 @@ def _checked(corners: Corners, at: Array, size: tuple[int, int], prior: float = 
     """Drop the corner farthest from the map through the others until all the rest agree; scale the covariances."""
     good, points = corners.consistent.copy(), corners.points_px
     side = np.sqrt(np.abs(np.linalg.det(corners.board.jacobian(at))))
-    limit = np.maximum(LIMIT_PX, LIMIT_SHARE * side)
     board = corners.board
     for _ in range(int(BAD_SHARE * len(points)) + 1):
         if 2 * np.sum(good) <= board.slopes(at).shape[-1]:
             return replace(corners, consistent=np.zeros(len(at), bool))
         weights = _weights(corners.covariance_px2, good)
         board = BoardMap.fit(at, points, size, weights, board)
-        excess = np.where(good, _left_out(points, board, at, weights) / limit, 0.0)
+        distance = _left_out(points, board, at, weights)
+        spread = LIMIT_SPREADS * float(np.median(distance[good]))
+        limit = np.maximum(np.maximum(LIMIT_PX, LIMIT_SHARE * side), np.minimum(spread, MOST_SHARE * side))
+        excess = np.where(good, distance / limit, 0.0)
         worst = int(np.argmax(excess))
         if excess[worst] <= 1.0:
             break
