@@ -99,7 +99,7 @@ def test_a_camera_is_not_planned_beyond_its_field():
 def test_scattered_tilts_lie_in_their_range_and_fill_it(name, low, high):
     scattered, _ = load_recipe(name)
     frames = plan(scattered)
-    assert len(frames) == 200
+    assert len(frames) == 400
     poses = [frame.cam_from_obj for frame in frames[::5]]
     tilts = np.degrees([tilt_rad(pose.R) for pose in poses])
     assert low <= tilts.min() < low + 0.15 * (high - low)
