@@ -13,12 +13,11 @@ from datasets.recipe import Recipe
 from pipelines.bench.cases import chosen_frames, image_of
 from pipelines.bench.rows import Row, compared
 from pipelines.bench.timing import Times, in_turn, total
-from pipelines.detection import detect_points
+from pipelines.board import SECTOR_FLAGS
+from pipelines.detection import SUBPIX_STOP, SUBPIX_WINDOW, detect_points
 from render.target import Target
 
 PART = "detection"
-WINDOW = (5, 5)
-STOP = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-4)
 Grey = NDArray[np.uint8]
 
 
@@ -39,14 +38,13 @@ def classic(image: Grey, target: Target) -> bool:
     """findChessboardCorners and cornerSubPix."""
     found, corners = cv2.findChessboardCorners(image, target.inner)
     if found:
-        cv2.cornerSubPix(image, corners, WINDOW, (-1, -1), STOP)
+        cv2.cornerSubPix(image, corners, SUBPIX_WINDOW, (-1, -1), SUBPIX_STOP)
     return found
 
 
 def sector_based(image: Grey, target: Target) -> bool:
     """findChessboardCornersSB as exact as it gets."""
-    flags = cv2.CALIB_CB_EXHAUSTIVE + cv2.CALIB_CB_ACCURACY
-    return cv2.findChessboardCornersSB(image, target.inner, flags=flags)[0]
+    return cv2.findChessboardCornersSB(image, target.inner, flags=SECTOR_FLAGS)[0]
 
 
 def _ours(image: Grey, target: Target) -> bool:

@@ -21,7 +21,7 @@ from pipelines.bench.timing import in_turn
 from pipelines.board import CLASSIC_FLAGS, find_board, textured_region
 from pipelines.circle import find_circle
 from pipelines.corners import refine_corners
-from pipelines.detection import CIRCLE_CLEARANCE, detect_points
+from pipelines.detection import CIRCLE_CLEARANCE, SUBPIX_STOP, SUBPIX_WINDOW, detect_points
 from pipelines.surface import BoardMap, grid
 from render.develop import decode_png, encode_png
 from render.master import write_master
@@ -75,9 +75,8 @@ def _detection(image: Any, target: Any) -> Iterator[tuple[str, Call, str, Call]]
     clear = np.linalg.norm(at - target.circle_centre[:2] / target.square_mm, axis=1) > CIRCLE_CLEARANCE
     rough = functools.partial(BoardMap.fit_rough, at, board.corners_px, size, clear)
     start = board.corners_px.astype(np.float32).reshape(-1, 1, 2)
-    stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 40, 1e-3)
     yield "map from board to image", rough, "its slopes once", functools.partial(rough().slopes, at)
-    subpix = lambda: cv2.cornerSubPix(image, start.copy(), (5, 5), (-1, -1), stop)  # noqa: E731
+    subpix = lambda: cv2.cornerSubPix(image, start.copy(), SUBPIX_WINDOW, (-1, -1), SUBPIX_STOP)  # noqa: E731
     yield "corners", functools.partial(refine_corners, image, rough(), target), "cv2.cornerSubPix", subpix
     corners = refine_corners(image, rough(), target)
     circle = functools.partial(find_circle, image, corners.board, corners.blur_px, corners.contrast, target)
