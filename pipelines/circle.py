@@ -130,7 +130,7 @@ def _patch(
         CLEAR_BLURS * blur_px * np.linalg.norm(np.linalg.inv(jacobian), axis=1),
         np.empty(squares[0].shape, bool),
     )
-    _on_white(*squares, margin, target.columns, target.rows, target.margin_squares, white)
+    _on_white(squares[0], squares[1], margin, target.columns, target.rows, target.margin_squares, white)
     rows, columns = np.nonzero(white)
     if len(rows) < LEAST_PIXELS:
         return None
