@@ -125,7 +125,7 @@ def settle(here: Any, samples: int, threads: int) -> None:
     render.image_settings.file_format, render.image_settings.color_mode = "OPEN_EXR", "RGBA"
     render.image_settings.color_depth = "32"
     cycles.device, cycles.samples, cycles.max_bounces = "CPU", samples, 0
-    cycles.use_adaptive_sampling = cycles.use_denoising = False
+    cycles.use_adaptive_sampling = cycles.use_denoising = cycles.use_light_tree = False
     cycles.pixel_filter_type = "BOX"
 
 
