@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from datasets.plan import plan
 from datasets.recipe import load_recipe
 from pipelines.bench.blender import NO_BPY, SCRIPT, VARIABLE, cycles
 from pipelines.bench.blender_scene import LENS, description
-from pipelines.bench.timing import Times, in_turn
+from pipelines.bench.timing import Times, in_turn, mean_of
 from render.light import SMOOTH_SAMPLES, lamp_irradiance
 
 
@@ -94,6 +95,13 @@ def test_requests_and_answers(tmp_path, monkeypatch):
         (times,) = in_turn(lambda: blender.render((0, 0, 5, 5)), repeats=3, warm_up=False)
         assert times == Times(4.0, 10.0)  # Blender's own: the median of 3, 4, 5
     assert blender.process.poll() is not None
+
+
+def test_the_mean_of_calls_in_a_row():
+    made = []
+    times = mean_of(lambda: made.append(time.sleep(0.01)), 5)
+    assert len(made) == 5
+    assert times.wall >= 0.0099  # a sleep is never shorter than asked, but for two clocks
 
 
 def test_no_interpreter_is_a_sentence(cli, monkeypatch):

@@ -26,12 +26,13 @@ from pipelines.bench.blender_scene import LENS, description
 from pipelines.bench.cases import chosen_frames, corner_errors, master_of, over_background, rms
 from pipelines.bench.frames import frame_of_ours
 from pipelines.bench.rows import Row, compared, noted
-from pipelines.bench.timing import Times, in_turn
+from pipelines.bench.timing import Times, in_turn, mean_of
 from render import backend
 from render.master import Image, Master, Region, target_region
 
 PART = "blender"
 SAMPLES = 64
+IN_A_ROW = 20  # frames of ours against one of Blender's, which takes seconds
 VARIABLE = "EPOSIT_BLENDER"
 SCRIPT = Path(__file__).resolve().parents[2] / "tools" / "blender_scene.py"
 NO_BPY = 3  # the script's exit code
@@ -57,10 +58,10 @@ def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
         yield from _checks(recipe, frame, ours, theirs, version)
         frame_of_ours(recipe, frame)
         part, that_part, whole, all_of_it, that_whole = in_turn(
-            functools.partial(master_of, recipe, frame),
+            lambda: mean_of(functools.partial(master_of, recipe, frame), IN_A_ROW),
             functools.partial(blender.render, region),
-            lambda: master_of(recipe, frame).full(camera),
-            functools.partial(frame_of_ours, recipe, frame),
+            lambda: mean_of(lambda: master_of(recipe, frame).full(camera), IN_A_ROW),
+            lambda: mean_of(functools.partial(frame_of_ours, recipe, frame), IN_A_ROW),
             functools.partial(blender.render, None),
             warm_up=False,
         )
