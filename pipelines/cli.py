@@ -163,7 +163,8 @@ def bench(
     only: Annotated[
         list[str] | None,
         typer.Option(
-            help="A part: render, stages, profile, frame, equal, detection, solver or growth; may be given again."
+            help="A part: render, stages, profile, frame, equal, detection, solver, growth, or blender, which `make "
+            "bench-blender` sets up; may be given again."
         ),
     ] = None,
     memory: Annotated[
