@@ -21,7 +21,12 @@ Masters = Annotated[
 ]
 
 DetectorName = Annotated[str, typer.Option("--detector", help="edge-fit (ours), opencv-subpix or opencv-sb.")]
-SolverName = Annotated[str, typer.Option("--solver", help="best, centred, eposit or posit.")]
+OWN = "or your own as package.module:function."
+SOLVERS_HELP = (
+    "best, centred, eposit, posit, opencv-sqpnp, opencv-epnp, opencv-iterative, opencv-p3p, opencv-fisheye, "
+    f"poselib-p3p, poselib-p4pf, {OWN}"
+)
+SolverName = Annotated[str, typer.Option("--solver", help=SOLVERS_HELP)]
 PointsName = Annotated[str, typer.Option("--points", help="detected, truth or truth+noise.")]
 CameraName = Annotated[str, typer.Option("--camera", help="Camera the solver assumes: exact, nominal or paper.")]
 Use = Annotated[str, typer.Option("--use", help="Object points: four or all.")]
