@@ -26,7 +26,24 @@ SOLVERS_HELP = (
     "best, centred, eposit, posit, opencv-sqpnp, opencv-epnp, opencv-iterative, opencv-p3p, opencv-fisheye, "
     f"poselib-p3p, poselib-p4pf, {OWN}"
 )
-SolverName = Annotated[str, typer.Option("--solver", help=SOLVERS_HELP)]
+SolverName = Annotated[str | None, typer.Option("--solver", help=f"{SOLVERS_HELP}  [default: best]")]
+MoreSolvers = Annotated[
+    list[str] | None,
+    typer.Option("--solver", help=f"One more solver, by name {OWN[:-1]}; may be given again."),
+]
+Estimator = Annotated[
+    str | None,
+    typer.Option(
+        metavar="PACKAGE.MODULE:FUNCTION",
+        help="Instead of a solver, your whole system: a function of image, camera and target.",
+    ),
+]
+PoseFile = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="Poses of another system, .csv or .parquet, to be scored beside the others."),
+]
+PosesName = Annotated[str | None, typer.Option("--name", help="Name of the poses of --poses in tables and report.")]
+Again = Annotated[bool, typer.Option("--again", help="Estimate anew what is there, as your function has changed.")]
 PointsName = Annotated[str, typer.Option("--points", help="detected, truth or truth+noise.")]
 CameraName = Annotated[str, typer.Option("--camera", help="Camera the solver assumes: exact, nominal or paper.")]
 Use = Annotated[str, typer.Option("--use", help="Object points: four or all.")]

@@ -7,6 +7,7 @@ from pathlib import Path
 import typer
 from rich.console import Console
 
+from datasets.errors import UserError
 from pipelines.commands import options as o
 from pipelines.commands.opening import begin, opened
 
@@ -16,6 +17,7 @@ def run(
     out: o.Out,
     regime: o.Regime = None,
     masters: o.Masters = None,
+    solver: o.MoreSolvers = None,
     workers: o.Workers = 1,
     quiet: o.Quiet = False,
 ) -> None:
@@ -23,10 +25,11 @@ def run(
     from pipelines import stages
 
     console = Console(quiet=quiet)
+    settings = [*stages.RUN_SETTINGS, *stages.settings_of(solver or [])]
     dataset = begin(recipe, out, regime, masters, console)
     stages.run_generate(dataset, workers, console)
     stages.run_detect(dataset, workers, console)
-    stages.run_estimate(dataset, stages.RUN_SETTINGS, workers, console)
+    stages.run_estimate(dataset, settings, workers, console)
     stages.run_score(dataset, workers, console)
     report(out)
 
@@ -64,29 +67,53 @@ def detect(
 
 def estimate(
     folder: o.Folder,
-    solver: o.SolverName = "best",
+    solver: o.SolverName = None,
+    estimator: o.Estimator = None,
     points: o.PointsName = "detected",
     camera: o.CameraName = "exact",
     use: o.Use = "all",
     noise_px: o.NoisePx = 0.4,
     draws: o.Draws = 5,
     detector: o.DetectorName = "edge-fit",
+    again: o.Again = False,
     workers: o.Workers = 1,
     quiet: o.Quiet = False,
 ) -> None:
-    """Estimate poses; nothing is rendered again."""
+    """Estimate poses with a solver, or with your own function; nothing is rendered again."""
     from pipelines import stages
     from pipelines.estimate import Setting
+    from pipelines.systems import System
 
-    setting = Setting(solver, points, camera, use, noise_px, draws, detector)
-    stages.run_estimate(opened(folder), [setting], workers, Console(quiet=quiet))
+    setting = Setting("best" if solver is None else solver, points, camera, use, noise_px, draws, detector)
+    console = Console(quiet=quiet)
+    if estimator is None:
+        stages.run_estimate(opened(folder), [setting], workers, console, again=again)
+        return
+    if solver is not None or setting != Setting(camera=camera):
+        raise UserError("--estimator is given images: leave out --solver and the options that choose points")
+    stages.run_system(opened(folder), System(estimator, camera), workers, console, again=again)
 
 
-def score(folder: o.Folder, workers: o.Workers = 1, quiet: o.Quiet = False) -> None:
-    """Score every estimate against the truth."""
+def score(
+    folder: o.Folder,
+    poses: o.PoseFile = None,
+    name: o.PosesName = None,
+    camera: o.CameraName = "exact",
+    workers: o.Workers = 1,
+    quiet: o.Quiet = False,
+) -> None:
+    """Score every estimate, and the poses of a file, against the truth."""
     from pipelines import stages
+    from pipelines.systems import System
 
-    stages.run_score(opened(folder), workers, Console(quiet=quiet))
+    if (poses is None) != (name is None):
+        raise UserError("--poses and --name go together; give a file of poses and what to call them, or neither")
+    if poses is None and camera != "exact":
+        raise UserError("--camera goes with --poses; leave it out, or give a file of poses")
+    dataset, console = opened(folder), Console(quiet=quiet)
+    if poses is not None and name is not None:
+        stages.run_import(dataset, poses, System(name, camera), console)
+    stages.run_score(dataset, workers, console)
 
 
 def report(folder: o.Folder) -> None:

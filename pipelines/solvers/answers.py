@@ -115,17 +115,24 @@ def solve_each(
 
 def gather(points_in_obj: Array, points_px: Array, camera: Camera, answers: Sequence[Answer], single: bool) -> Solution:
     """Answers to (b, n, 2) px as one `Solution`; for a single image without the leading axis."""
+    batch = stack(answers)
+    ok, rmse, pose = batch.status == Status.OK, batch.reprojection_rmse_px, batch.cam_from_obj
+    if np.any(ok):
+        with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+            miss = camera.project(Pose(pose.R[ok], pose.t[ok]).apply(points_in_obj)) - points_px[ok]
+            rmse[ok] = np.sqrt(np.mean(np.sum(miss**2, axis=-1), axis=-1))
+    if not single:
+        return batch
+    iterations, covariance = int(batch.iterations[0]), batch.covariance[0]
+    return Solution(str(batch.status[0]), Pose(pose.R[0], pose.t[0]), iterations, float(rmse[0]), covariance)
+
+
+def stack(answers: Sequence[Answer]) -> Solution:
+    """b answers as one batch, without reprojection errors (NaN)."""
     b = len(answers)
     R = np.array([answer.R for answer in answers]).reshape(b, 3, 3)
     t = np.array([answer.t for answer in answers]).reshape(b, 3)
     status = np.array([str(answer.status) for answer in answers], dtype=np.str_)
-    ok, rmse = status == Status.OK, np.full(b, np.nan)
-    if np.any(ok):
-        with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-            miss = camera.project(Pose(R[ok], t[ok]).apply(points_in_obj)) - points_px[ok]
-            rmse[ok] = np.sqrt(np.mean(np.sum(miss**2, axis=-1), axis=-1))
     iterations = np.array([answer.iterations for answer in answers], dtype=np.int64)
     covariance = np.array([answer.covariance for answer in answers]).reshape(b, 6, 6)
-    if single:
-        return Solution(str(status[0]), Pose(R[0], t[0]), int(iterations[0]), float(rmse[0]), covariance[0])
-    return Solution(status, Pose(R, t), iterations, rmse, covariance)
+    return Solution(status, Pose(R, t), iterations, np.full(b, np.nan), covariance)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 import inspect
 import re
@@ -78,7 +79,7 @@ def user_solver(name: str, tell: Callable[[str], None]) -> Solver:
         obj, batch, single = checked(points_in_obj, points_px)
         extra = {"sigma_px": sigma_px} if takes_sigma else {}
         answers = [
-            attempt(lambda image=image: function(obj.copy(), image.copy(), camera, **extra), f"--solver {name}", tell)
+            attempt(functools.partial(function, obj.copy(), image.copy(), camera, **extra), f"--solver {name}", tell)
             for image in batch
         ]
         return gather(obj, batch, camera, answers, single)
