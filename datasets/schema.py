@@ -25,9 +25,11 @@ _POSE = _floats(
 _IMAGE = pa.struct([pa.field("bytes", pa.binary()), pa.field("path", pa.string())])
 _KEY = [
     _field("frame_id", pa.int64(), "frame"),
-    _field("solver", pa.string(), "solver that made the estimate"),
+    _field("solver", pa.string(), "solver, function or file of poses that made the estimate"),
     _field(
-        "points", pa.string(), "image points it was given: detected (by which detector), truth, or truth with noise"
+        "points",
+        pa.string(),
+        "image points it was given: detected (by which detector), truth, or truth with noise; image: the image alone",
     ),
     _field("camera", pa.string(), "camera it assumed: exact, nominal or paper"),
     _field("use", pa.string(), "object points it used: four or all"),

@@ -78,6 +78,17 @@ class Dataset:
         except OSError as error:
             raise refused(path, error) from error
 
+    def remove_shard(self, path: Path) -> None:
+        """Remove a shard if it is there.
+
+        Raises:
+            UserError: the disk or its permissions refuse.
+        """
+        try:
+            path.unlink(missing_ok=True)
+        except OSError as error:
+            raise refused(path, error) from error
+
     def read_shard(self, path: Path, columns: list[str] | None = None) -> pa.Table:
         """The rows of one shard, or some columns of them.
 

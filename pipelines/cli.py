@@ -1,66 +1,54 @@
-"""The command line. A command parses, calls one function and prints; heavy modules are imported inside the commands."""
+"""The command line: which commands there are, and how an error of theirs reaches the terminal."""
 
 from __future__ import annotations
 
 import os
 import sys
 from collections.abc import Callable
-from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
 from datasets.errors import UserError
+from pipelines.commands import stages, tools
 
 USER_ERROR, INTERRUPTED = 2, 130
-Out = Annotated[Path, typer.Option("--out", help="Folder of the dataset; a run that stopped is resumed there.")]
-Folder = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a dataset.")]
-RecipeName = Annotated[str, typer.Argument(metavar="RECIPE", help="A .toml file, or a name from `recipes`.")]
-Workers = Annotated[int, typer.Option(help="Processes; the result is the same for any number.")]
-DetectorName = Annotated[str, typer.Option("--detector", help="edge-fit (ours), opencv-subpix or opencv-sb.")]
-Regime = Annotated[
-    str | None, typer.Option(help="Sensor regime, as if the recipe said so: clean, typical, paper or harsh.")
-]
-Masters = Annotated[
-    Path | None, typer.Option(metavar="DIR", help="Dataset whose linear light is taken where it shows the same views.")
-]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars.")]
+ABOUT = "Rendered images of a chessboard through exact fish-eye cameras, detected, solved and scored against truth."
 
-app = typer.Typer(
-    name="pipelines",
-    help="Rendered images of a chessboard through exact fish-eye cameras, detected, solved and scored against truth.",
-    epilog="Start with: python -m pipelines demo",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
+# Each command with its example, in the order of `--help`.
+COMMANDS: tuple[tuple[Callable[..., None], str], ...] = (
+    (stages.run, "run demo --out out/demo"),
+    (stages.generate, "generate demo --out out/demo"),
+    (stages.detect, "detect out/demo --detector opencv-subpix"),
+    (stages.estimate, "estimate out/demo --points truth+noise --noise-px 0.4 --draws 5 --use four"),
+    (stages.score, "score out/demo"),
+    (stages.report, "report out/demo"),
+    (stages.demo, "demo --out out/demo"),
+    (tools.verify, "verify out/demo"),
+    (tools.doctor, "doctor"),
+    (tools.bench, "bench demo --only render --only solver --out bench.md"),
+    (tools.recipes, "recipes"),
+    (tools.describe, "describe demo"),
 )
 
 
-@app.command(epilog="Example: python -m pipelines run demo --out out/demo")
-def run(
-    recipe: RecipeName,
-    out: Out,
-    regime: Regime = None,
-    masters: Masters = None,
-    workers: Workers = 1,
-    quiet: Quiet = False,
-) -> None:
-    """Every stage: generate, detect, estimate, score, report."""
-    from pipelines import stages
-
-    console = Console(quiet=quiet)
-    dataset = _claim(recipe, out, regime, masters, console)
-    stages.run_generate(dataset, workers, console)
-    stages.run_detect(dataset, workers, console)
-    stages.run_estimate(dataset, stages.RUN_SETTINGS, workers, console)
-    stages.run_score(dataset, workers, console)
-    report(out)
+def command_line() -> typer.Typer:
+    """The commands as one application."""
+    app = typer.Typer(
+        name="pipelines",
+        help=ABOUT,
+        epilog="Start with: python -m pipelines demo",
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        rich_markup_mode=None,
+    )
+    for command, example in COMMANDS:
+        app.command(epilog=f"Example: python -m pipelines {example}")(command)
+    return app
 
 
+<<<<<<< HEAD
 @app.command(epilog="Example: python -m pipelines generate demo --out out/demo")
 def generate(
     recipe: RecipeName,
@@ -255,6 +243,9 @@ def _open(folder: Path) -> Any:
     from datasets.store import open_dataset
 
     return open_dataset(folder)
+=======
+app = command_line()
+>>>>>>> wt-systems
 
 
 def guarded(command: Callable[[], Any]) -> int:

@@ -12,6 +12,7 @@ from datasets.errors import UserError
 
 MAX_WORKERS = 256
 Task = TypeVar("Task")
+Result = TypeVar("Result")
 
 
 def check_workers(workers: int) -> None:
@@ -29,8 +30,8 @@ def runs_here(tasks: Sequence[Task], workers: int) -> bool:
     return workers == 1 or len(tasks) < 2
 
 
-def map_shards(run_one: Callable[[Task], None], tasks: Sequence[Task], workers: int) -> Iterator[Task]:
-    """Run every task, here or in `workers` processes, and yield each when it is done, in any order.
+def map_shards(run_one: Callable[[Task], Result], tasks: Sequence[Task], workers: int) -> Iterator[tuple[Task, Result]]:
+    """Run every task, here or in `workers` processes, and yield each with its result when it is done, in any order.
 
     Raises:
         UserError: a number of workers that is not usable, or a worker that the system killed.
@@ -39,8 +40,7 @@ def map_shards(run_one: Callable[[Task], None], tasks: Sequence[Task], workers: 
     check_workers(workers)
     if runs_here(tasks, workers):
         for task in tasks:
-            run_one(task)
-            yield task
+            yield task, run_one(task)
         return
     # Mitsuba starts threads, which a forked process would not have: processes are spawned.
     context = multiprocessing.get_context("spawn")
@@ -48,8 +48,7 @@ def map_shards(run_one: Callable[[Task], None], tasks: Sequence[Task], workers: 
         futures = {pool.submit(run_one, task): task for task in tasks}
         try:
             for future in as_completed(futures):
-                future.result()
-                yield futures[future]
+                yield futures[future], future.result()
         except BrokenProcessPool:
             raise UserError(
                 "a worker process was killed, often for lack of memory; run again with fewer --workers"

@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import pyarrow as pa
 
-import eposit
 from datasets.errors import UserError
 from datasets.plan import Stream, rng_for, shard_count
 from datasets.recipe import assumed_camera
-from datasets.schema import ESTIMATES, FRAMES
+from datasets.schema import FRAMES
 from datasets.store import Dataset
-from eposit import Solution
+from eposit import Camera, Solution
 from eposit.arrays import Array
 from pipelines.detect import check_detector, path_of
 from pipelines.detection import Detector
-from pipelines.rows import camera_of, covariances_by_frame, points_by_frame, pose_columns, table
+from pipelines.rows import camera_of, covariances_by_frame, estimate_rows, points_by_frame
+from pipelines.solvers.answers import Answer, Solver, gather
+from pipelines.solvers.given import file_name, is_given
+from pipelines.solvers.names import check_solver, find_solver, takes_theta_centre
 
 POINTS = ("detected", "truth", "truth+noise")
 CAMERAS = ("exact", "nominal", "paper")
@@ -35,7 +37,7 @@ class Setting:
         UserError: an unknown word, or a number out of range.
     """
 
-    solver: Annotated[str, "a method of eposit.solve"] = "best"
+    solver: Annotated[str, "a name that `find_solver` knows"] = "best"
     points: Annotated[str, "detected, truth or truth+noise"] = "detected"
     camera: Annotated[str, "camera the solver assumes: exact, nominal or paper"] = "exact"
     use: Annotated[str, "object points: four or all"] = "all"
@@ -44,9 +46,10 @@ class Setting:
     detector: Annotated[str, "whose points `detected` are"] = Detector.EDGE_FIT
 
     def __post_init__(self) -> None:
-        for name, allowed in (("solver", eposit.METHODS), ("points", POINTS), ("camera", CAMERAS), ("use", USES)):
+        for name, allowed in (("points", POINTS), ("camera", CAMERAS), ("use", USES)):
             if getattr(self, name) not in allowed:
                 raise UserError(f"unknown {name} {getattr(self, name)!r}; choose one of {', '.join(allowed)}")
+        check_solver(self.solver, self.use)
         check_detector(self.detector)
         if not 0.0 < self.noise_px <= 100.0:
             raise UserError(f"noise of {self.noise_px} px is not usable; give --noise-px above 0 and at most 100")
@@ -64,36 +67,47 @@ class Setting:
     def name(self) -> str:
         """Name of the shards."""
         draws = f"-x{self.draws}" if self.points == "truth+noise" else ""
-        return f"{self.solver}-{self.points_name}{draws}-{self.camera}-{self.use}"
+        return f"{file_name(self.solver)}-{self.points_name}{draws}-{self.camera}-{self.use}"
 
 
 def is_done(dataset: Dataset, index: int, setting: Setting) -> bool:
     """Whether a shard is there."""
-    return dataset.is_done(_path(dataset, index, setting))
+    return dataset.is_done(path_of_shard(dataset, index, setting.name))
 
 
-def run_shard(dataset: Dataset, index: int, setting: Setting) -> None:
-    """Make one shard of `estimates`."""
+def run_shard(dataset: Dataset, index: int, setting: Setting) -> str | None:
+    """Make one shard of `estimates`; what a user's function first failed with, if it did."""
     count = shard_count(dataset.recipe)
     columns = [name for name in FRAMES.names if name != "image"]
     frames = dataset.read_shard(dataset.shard_path("frames", index, count), columns).to_pylist()
     target, detected = dataset.recipe.target, setting.points == "detected"
+    notes: list[str] = []
+    solver = find_solver(setting.solver, notes.append)
     path = path_of(dataset, index, setting.detector) if detected else dataset.shard_path("keypoints", index, count)
     rows = dataset.read_shard(path)
     points = points_by_frame(rows, target)
     sigmas = covariances_by_frame(rows, target) if detected else {}
-    parts = [
-        _estimate(dataset, frame, points[frame["frame_id"]], sigmas.get(frame["frame_id"]), setting) for frame in frames
-    ]
-    dataset.write_shard(_path(dataset, index, setting), pa.concat_tables(parts))
+    parts: list[pa.Table] = []
+    for frame in frames:
+        frame_id, before = frame["frame_id"], len(notes)
+        parts.append(_estimate(dataset, frame, points[frame_id], sigmas.get(frame_id), setting, solver))
+        notes[before:] = [f"frame {frame_id}: {note}" for note in notes[before:]]
+    dataset.write_shard(path_of_shard(dataset, index, setting.name), pa.concat_tables(parts))
+    return notes[0] if notes else None
 
 
-def _path(dataset: Dataset, index: int, setting: Setting) -> Path:
-    return dataset.shard_path("estimates", index, shard_count(dataset.recipe), setting.name)
+def path_of_shard(dataset: Dataset, index: int, name: str) -> Path:
+    """Place of one shard of the estimates that have a name."""
+    return dataset.shard_path("estimates", index, shard_count(dataset.recipe), name)
 
 
 def _estimate(
-    dataset: Dataset, frame: dict[str, Any], points_px: Array, sigma: Array | None, setting: Setting
+    dataset: Dataset,
+    frame: dict[str, Any],
+    points_px: Array,
+    sigma: Array | None,
+    setting: Setting,
+    solver: Solver,
 ) -> pa.Table:
     """Rows of one frame, one for each draw. sigma: (n, 2, 2) covariances of detected points, px^2."""
     target = dataset.recipe.target
@@ -106,36 +120,16 @@ def _estimate(
     found = np.all(np.isfinite(batch[0]), axis=1)
     if setting.use == "all":  # a point that was not found takes no part; of four, none may be missing
         chosen, batch = chosen[found], batch[:, found]
-    b = len(batch)
     if np.sum(found) < 4:
-        R, t = np.full((b, 3, 3), np.nan), np.full((b, 3), np.nan)
-        status = np.full(b, "points_missing")
-        iterations, rmse = np.zeros(b, np.int64), np.full(b, np.nan)
-        covariance = np.full((b, 6, 6), np.nan)
+        answers = [Answer("points_missing")] * len(batch)
+        solution = gather(target.points[chosen], batch, camera_of(frame), answers, single=False)
     else:
         known = setting.noise_px if noisy else None if sigma is None else sigma[chosen]
-        stated = known is not None and setting.solver == REACHES_BOUND
-        solution = solve_with(setting, target.points[chosen], batch, frame, known)
-        covariance = solution.covariance if stated else np.full((b, 6, 6), np.nan)
-        R, t, status = solution.cam_from_obj.R, solution.cam_from_obj.t, solution.status
-        iterations, rmse = solution.iterations, solution.reprojection_rmse_px
-    return table(
-        ESTIMATES,
-        {
-            "frame_id": np.full(b, frame["frame_id"]),
-            "solver": np.full(b, setting.solver),
-            "points": np.full(b, setting.points_name),
-            "camera": np.full(b, setting.camera),
-            "use": np.full(b, setting.use),
-            "draw": np.arange(b),
-            "status": status,
-            "n_points": np.full(b, len(chosen)),
-            **pose_columns(R, t),
-            "iterations": iterations,
-            "reprojection_rmse_px": rmse,
-            "covariance": list(covariance.reshape(b, 36)),
-        },
-    )
+        solution = solve_with(setting, target.points[chosen], batch, frame, known, solver)
+        if known is None or not (setting.solver == REACHES_BOUND or is_given(setting.solver)):
+            solution = replace(solution, covariance=np.full((len(batch), 6, 6), np.nan))
+    key = (setting.solver, setting.points_name, setting.camera, setting.use)
+    return estimate_rows([frame["frame_id"]] * len(batch), draws, key, solution, len(chosen))
 
 
 def _noise(dataset: Dataset, frame: dict[str, Any], draw: int, setting: Setting) -> Array:
@@ -145,20 +139,41 @@ def _noise(dataset: Dataset, frame: dict[str, Any], draw: int, setting: Setting)
 
 
 def solve_with(
-    setting: Setting, points_in_obj: Array, batch: Array, frame: dict[str, Any], sigma_px: Array | float | None = None
+    setting: Setting,
+    points_in_obj: Array,
+    batch: Array,
+    frame: dict[str, Any],
+    sigma_px: Array | float | None = None,
+    solver: Solver | None = None,
 ) -> Solution:
     """Solve a batch with the camera that the setting assumes; `sigma_px` as for `eposit.solve`.
 
+    solver: the setting's, if it is at hand already.
+
+    Raises:
+        UserError: the solver does not take these points.
+    """
+    camera = assumed(frame, setting.camera)
+    centre: dict[str, Any] = {}
+    if setting.camera == "paper" and takes_theta_centre(setting.solver):
+        centre = {"theta_centre": (camera.width / 2.0, camera.height / 2.0)}
+    solver = solver or find_solver(setting.solver)
+    try:
+        return solver(points_in_obj, batch, camera, sigma_px=sigma_px, **centre)
+    except UserError:
+        raise
+    except ValueError as error:
+        raise UserError(f"solver {setting.solver} does not take these points: {error}") from error
+
+
+def assumed(frame: dict[str, Any], choice: str) -> Camera:
+    """The camera that a solver assumes for a row of `frames`.
+
     exact: the true camera. nominal: nominal focal length, image centre. paper: nominal focal length, the true
-    principal point subtracted from x and y, the image centre inside theta (EPOSIT only; other methods measure
-    theta from the principal point).
+    principal point subtracted from x and y; a solver that can takes the image centre inside theta.
     """
     true = camera_of(frame)
-    if setting.camera == "exact":
-        return eposit.solve(points_in_obj, batch, true, setting.solver, sigma_px=sigma_px)
+    if choice == "exact":
+        return true
     nominal = assumed_camera(true, frame["nominal_f_px"])
-    if setting.camera == "nominal":
-        return eposit.solve(points_in_obj, batch, nominal, setting.solver, sigma_px=sigma_px)
-    shifted = nominal.replace(cx=true.cx, cy=true.cy)
-    centre = (nominal.cx, nominal.cy) if setting.solver == "eposit" else None
-    return eposit.solve(points_in_obj, batch, shifted, setting.solver, sigma_px=sigma_px, theta_centre=centre)
+    return nominal if choice == "nominal" else nominal.replace(cx=true.cx, cy=true.cy)

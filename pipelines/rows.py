@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,8 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from datasets.errors import UserError
-from eposit import Camera, Pose
+from datasets.schema import ESTIMATES
+from eposit import Camera, Pose, Solution
 from eposit.arrays import Array
 from render.develop import decode_png
 from render.target import Target
@@ -33,6 +35,25 @@ def pose_columns(R: Array, t: Array) -> dict[str, Array]:
         quaternion[finite] = Pose(R[finite], t[finite]).quaternion
     columns = {f"q_{axis}": quaternion[:, i] for i, axis in enumerate("wxyz")}
     return columns | {f"t_{axis}_mm": t[:, i] for i, axis in enumerate("xyz")}
+
+
+def estimate_rows(
+    frame_ids: Sequence[int], draws: Sequence[int], key: tuple[str, str, str, str], found: Solution, points: int
+) -> pa.Table:
+    """Rows of `estimates` from b solutions. key: solver, points, camera and use. points: how many the solver had."""
+    b = len(frame_ids)
+    columns = {
+        "frame_id": frame_ids,
+        **{name: [value] * b for name, value in zip(("solver", "points", "camera", "use"), key, strict=True)},
+        "draw": draws,
+        "status": found.status,
+        "n_points": np.full(b, points),
+        **pose_columns(found.cam_from_obj.R, found.cam_from_obj.t),
+        "iterations": found.iterations,
+        "reprojection_rmse_px": found.reprojection_rmse_px,
+        "covariance": list(found.covariance.reshape(b, 36)),
+    }
+    return table(ESTIMATES, columns)
 
 
 def poses(rows: pa.Table) -> Pose:

@@ -27,6 +27,15 @@ def is_done(dataset: Dataset, estimates: Path) -> bool:
     return dataset.is_done(_path(dataset, estimates))
 
 
+def forget(dataset: Dataset, estimates: Path) -> None:
+    """Remove the scores of a shard of estimates that is about to change.
+
+    Raises:
+        UserError: the disk or its permissions refuse.
+    """
+    dataset.remove_shard(_path(dataset, estimates))
+
+
 def run_shard(dataset: Dataset, estimates: Path) -> None:
     """Make one shard of `scores`."""
     rows = dataset.read_shard(estimates)

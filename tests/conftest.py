@@ -11,6 +11,9 @@ from datasets.store import open_dataset
 from pipelines.cli import main
 from pipelines.verify import verify
 
+pytest.register_assert_rewrite("tests.wrong_input")
+from tests.wrong_input import Place  # noqa: E402
+
 # Two frames of 400 x 300 px, a shard each; the board fills the middle of the picture.
 TINY = """\
 name = "tiny"
@@ -76,6 +79,13 @@ def tiny(tmp_path_factory):
     recipe.write_text(TINY)
     assert command("run", recipe, "--out", folder / "dataset", "--quiet") == 0
     return TINY, folder / "dataset"
+
+
+@pytest.fixture
+def place(tmp_path, tiny, monkeypatch):
+    """A `Place` of its own for each test."""
+    text, source = tiny
+    return Place(tmp_path, text, source, monkeypatch)
 
 
 @pytest.fixture(scope="session")

@@ -10,6 +10,7 @@ import numpy as np
 
 from datasets.schema import COMPONENTS
 from datasets.store import RECIPE_FILE, Dataset, refused
+from eposit.arrays import Array
 from pipelines.detection import Detector
 from pipelines.doctor import versions
 from pipelines.report import figures
@@ -39,7 +40,9 @@ def write_report(dataset: Dataset) -> Path:
     ]
     frames = dataset.read("frames", columns).to_pylist()
     by_id = {frame["frame_id"]: frame for frame in frames}
-    found, points = series(dataset.read("scores")), point_errors(dataset, frames)
+    found = series(dataset.read("scores"))
+    # Who scores a whole system of their own may have detected nothing.
+    points = point_errors(dataset, frames) if dataset.shards("detections") else []
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
@@ -73,7 +76,10 @@ def write_report(dataset: Dataset) -> Path:
 def _gallery(dataset: Dataset, frames: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Evenly chosen frames with their detected points."""
     chosen = {frames[int(i)]["frame_id"] for i in np.linspace(0, len(frames) - 1, min(GALLERY, len(frames))).round()}
-    points = points_by_frame(of_detector(dataset.read("detections"), Detector.EDGE_FIT), dataset.recipe.target)
+    points: dict[int, Array] = {}
+    if dataset.shards("detections"):
+        points = points_by_frame(of_detector(dataset.read("detections"), Detector.EDGE_FIT), dataset.recipe.target)
+    none = np.full((len(dataset.recipe.target.points), 2), np.nan)
     pictures: list[dict[str, Any]] = []
     for path in dataset.shards("frames"):
         ids = dataset.read_shard(path, ["frame_id"])["frame_id"].to_pylist()
@@ -84,9 +90,10 @@ def _gallery(dataset: Dataset, frames: list[dict[str, Any]]) -> list[dict[str, A
                 continue
             frame = next(frame for frame in frames if frame["frame_id"] == frame_id)
             region = tuple(frame[f"region_{a}_px"] for a in ("x", "y", "width", "height"))
-            svg = figures.picture(decode_image(image, path, frame_id), region, points[frame_id])  # type: ignore[arg-type]
-            found = int(np.isfinite(points[frame_id][:, 0]).sum())
-            pictures.append({**frame, "svg": svg, "found": found, "total": len(points[frame_id])})
+            marked = points.get(frame_id, none)
+            svg = figures.picture(decode_image(image, path, frame_id), region, marked)  # type: ignore[arg-type]
+            found = int(np.isfinite(marked[:, 0]).sum())
+            pictures.append({**frame, "svg": svg, "found": found, "total": len(marked)})
     return pictures
 
 

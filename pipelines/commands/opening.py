@@ -1,0 +1,57 @@
+"""What a command works on: a recipe, a new or resumed dataset, a finished one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+
+def load(recipe: str, regime: str | None) -> tuple[Any, str]:
+    """A recipe and its text, with another regime if one is given.
+
+    Raises:
+        UserError: no such recipe or regime, or a wrong one.
+    """
+    from datasets.override import with_regime
+    from datasets.recipe import load_recipe, parse_recipe
+
+    loaded, text = load_recipe(recipe)
+    if regime is None:
+        return loaded, text
+    text = with_regime(text, regime, recipe)
+    return parse_recipe(text, f"recipe {recipe} with --regime {regime}"), text
+
+
+def begin(recipe: str, out: Path, regime: str | None, masters: Path | None, console: Console) -> Any:
+    """The dataset of a recipe, begun or resumed in `out`, with linear light from `masters` where it fits.
+
+    Raises:
+        UserError: a recipe, folder or plan that is not usable.
+    """
+    from datasets.plan import plan
+    from datasets.store import claim, open_dataset
+
+    loaded, text = load(recipe, regime)
+    plan(loaded)
+    if masters is not None:
+        open_dataset(masters)  # before anything is written
+    dataset = claim(out, loaded, text)
+    if masters is not None:
+        from pipelines.borrow import borrow_masters
+
+        taken, lacking = borrow_masters(dataset, masters)
+        console.print(f"masters: {taken} of {lacking} taken from {masters}; the rest is rendered")
+    return dataset
+
+
+def opened(folder: Path) -> Any:
+    """The dataset in a folder.
+
+    Raises:
+        UserError: there is none.
+    """
+    from datasets.store import open_dataset
+
+    return open_dataset(folder)

@@ -1,0 +1,63 @@
+"""Options and arguments of the commands, each named once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+Out = Annotated[Path, typer.Option("--out", help="Folder of the dataset; a run that stopped is resumed there.")]
+Folder = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a dataset.")]
+RecipeName = Annotated[str, typer.Argument(metavar="RECIPE", help="A .toml file, or a name from `recipes`.")]
+ShownRecipe = Annotated[str | None, typer.Argument(metavar="[RECIPE]", help="Show its values beside the keys.")]
+Workers = Annotated[int, typer.Option(help="Processes; the result is the same for any number.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars.")]
+Regime = Annotated[
+    str | None, typer.Option(help="Sensor regime, as if the recipe said so: clean, typical, paper or harsh.")
+]
+Masters = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Dataset whose linear light is taken where it shows the same views.")
+]
+
+DetectorName = Annotated[str, typer.Option("--detector", help="edge-fit (ours), opencv-subpix or opencv-sb.")]
+OWN = "or your own as package.module:function."
+SOLVERS_HELP = (
+    "best, centred, eposit, posit, opencv-sqpnp, opencv-epnp, opencv-iterative, opencv-p3p, opencv-fisheye, "
+    f"poselib-p3p, poselib-p4pf, {OWN}"
+)
+SolverName = Annotated[str | None, typer.Option("--solver", help=f"{SOLVERS_HELP}  [default: best]")]
+MoreSolvers = Annotated[
+    list[str] | None,
+    typer.Option("--solver", help=f"One more solver, by name {OWN[:-1]}; may be given again."),
+]
+Estimator = Annotated[
+    str | None,
+    typer.Option(
+        metavar="PACKAGE.MODULE:FUNCTION",
+        help="Instead of a solver, your whole system: a function of image, camera and target.",
+    ),
+]
+PoseFile = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="Poses of another system, .csv or .parquet, to be scored beside the others."),
+]
+PosesName = Annotated[str | None, typer.Option("--name", help="Name of the poses of --poses in tables and report.")]
+Again = Annotated[bool, typer.Option("--again", help="Estimate anew what is there, as your function has changed.")]
+PointsName = Annotated[str, typer.Option("--points", help="detected, truth or truth+noise.")]
+CameraName = Annotated[str, typer.Option("--camera", help="Camera the solver assumes: exact, nominal or paper.")]
+Use = Annotated[str, typer.Option("--use", help="Object points: four or all.")]
+NoisePx = Annotated[float, typer.Option("--noise-px", help="Standard deviation of truth+noise, px per axis.")]
+Draws = Annotated[int, typer.Option("--draws", help="Draws of truth+noise.")]
+
+Poses = Annotated[int, typer.Option(min=1, help="Poses measured with each camera.")]
+Only = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="A part: render, stages, profile, frame, equal, detection, solver or growth; may be given again."
+    ),
+]
+Memory = Annotated[
+    int | None, typer.Option(min=1, help="Instead, generate and detect so many frames and tell the memory.")
+]
+Markdown = Annotated[Path | None, typer.Option("--out", help="Write the table as Markdown, too.")]

@@ -1,0 +1,21 @@
+"""A user's own module, for the tests of functions that are named package.module:function."""
+
+from __future__ import annotations
+
+import importlib
+import itertools
+import sys
+import textwrap
+
+_numbers = itertools.count()
+
+
+def own_module(folder, patch, text):
+    """Name of a new module in a folder that becomes the current one; nothing of it outlives the test."""
+    name = f"own_module_{next(_numbers)}"
+    (folder / f"{name}.py").write_text(textwrap.dedent(text))
+    patch.chdir(folder)
+    patch.setattr(sys, "path", sys.path[:])
+    patch.delitem(sys.modules, name, raising=False)
+    importlib.invalidate_caches()
+    return name

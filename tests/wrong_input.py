@@ -1,0 +1,102 @@
+"""What the tests of wrong input share: where a case lays out its files, and what an error must look like."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a case lays out its files."""
+
+    folder: Path
+    text: str
+    source: Path
+    patch: pytest.MonkeyPatch
+
+    def recipe(self, text=None, name="recipe.toml"):
+        path = self.folder / name
+        path.write_bytes((self.text if text is None else text).encode())
+        return path
+
+    def dataset(self, without=()):
+        root = self.folder / "dataset"
+        shutil.copytree(self.source, root)
+        for name in without:
+            shutil.rmtree(root / name)
+        return root
+
+    def new(self):
+        return self.folder / "new"
+
+
+def estimate(*words):
+    return lambda place: ("estimate", place.dataset(), *words)
+
+
+def on_dataset(name, *words, without=()):
+    """A command on a dataset in which some tables are not there yet."""
+    return lambda place: (name, place.dataset(without), *words)
+
+
+def first(root, table):
+    return min((root / table).iterdir())
+
+
+def garbage(data):
+    return bytes(range(256)) * 20
+
+
+def put_image(root, data):
+    """Give the first frame other image bytes; the shard's footer stays."""
+    path = first(root, "frames")
+    table = pq.read_table(path)
+    rows = table.to_pylist()
+    rows[0]["image"]["bytes"] = data
+    pq.write_table(pa.Table.from_pylist(rows, schema=table.schema), path)
+
+
+def files(folder):
+    """Path to content and time of every file under a folder."""
+    found = (path for path in folder.rglob("*") if path.is_file())
+    return {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in found}
+
+
+def assert_one_sentence(code, err, words):
+    assert code == 2
+    assert err.startswith("error: ")
+    assert err.endswith("\n")
+    assert err.count("\n") == 1
+    assert words in err
+
+
+def assert_refused(case, place, cli):
+    """A case, (how its files and command are laid out, words of the sentence), is refused and no file changes."""
+    arrange, words = case
+    arguments = arrange(place)
+    before = files(place.folder)
+    outcome = cli(*arguments)
+    assert_one_sentence(outcome.code, outcome.err, words)
+    assert before.items() <= files(place.folder).items()
+
+
+def alone(*words, **variables):
+    """A command in a process of its own."""
+    return subprocess.run(
+        [sys.executable, "-m", "pipelines", *map(str, words)],
+        cwd=Path(__file__).parents[1],
+        env=os.environ | variables,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
