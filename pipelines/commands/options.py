@@ -54,7 +54,8 @@ Poses = Annotated[int, typer.Option(min=1, help="Poses measured with each camera
 Only = Annotated[
     list[str] | None,
     typer.Option(
-        help="A part: render, stages, profile, frame, equal, detection, solver or growth; may be given again."
+        help="A part: render, stages, profile, frame, equal, detection, solver, growth, or blender, which `make "
+        "bench-blender` sets up; may be given again."
     ),
 ]
 Memory = Annotated[
