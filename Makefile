@@ -4,6 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SETUP := $(VENV)/.done
 BLENDER := .venv-blender
+BLENDER_PYTHON ?= $(PYTHON)
 
 .PHONY: help setup demo test test-full check-slow lint types layers bench bench-blender wheel lock clean
 
@@ -48,8 +49,9 @@ bench-blender: $(SETUP) $(BLENDER)/.done  ## the same against Blender's Cycles; 
 	EPOSIT_BLENDER=$(BLENDER)/bin/python $(BIN)/python -m pipelines bench --only blender
 
 $(BLENDER)/.done:
-	$(PYTHON) -m venv $(BLENDER)
-	$(BLENDER)/bin/python -m pip install --quiet --disable-pip-version-check bpy
+	$(BLENDER_PYTHON) -m venv --clear $(BLENDER)
+	$(BLENDER)/bin/python -m pip install --quiet --disable-pip-version-check --only-binary bpy bpy || \
+		{ echo "bpy has wheels for some Pythons only, as 3.11 and 3.13; set BLENDER_PYTHON=..."; exit 1; }
 	@touch $@
 
 wheel: $(SETUP)  ## the library `eposit` as a wheel in dist/
