@@ -83,7 +83,7 @@ def _solve_linear(
     start, reproduces = posit_checked(problem.points_in_obj, x, y, tol, max_iterations)
     mark(status, ~start.converged, Status.NOT_CONVERGED)
     mark(status, ~reproduces, Status.INCONSISTENT)
-    return _finish(problem, turn_back(back, start), status)
+    return finish(problem, turn_back(back, start), status)
 
 
 def _solve_best(problem: Problem, refined: bool) -> Solution:
@@ -96,7 +96,7 @@ def _solve_best(problem: Problem, refined: bool) -> Solution:
     candidates = _candidates(problem, found, refined)
     best = _lowest(candidates, len(found))
     mark(status, ~(best.converged & np.isfinite(best.cost)), Status.NOT_CONVERGED)
-    return _finish(problem, Start(best.R, best.t, best.steps, best.converged), status)
+    return finish(problem, Start(best.R, best.t, best.steps, best.converged), status)
 
 
 def _candidates(problem: Problem, found: list[Start], refined: bool) -> Refined:
@@ -137,10 +137,11 @@ def _coplanar(problem: Problem, status: NDArray[np.str_]) -> Solution:
     mark(status, np.ones(len(status), bool), Status.COPLANAR)
     b = len(status)
     nothing = Start(np.full((b, 3, 3), np.nan), np.full((b, 3), np.nan), np.zeros(b, np.int64), np.zeros(b, bool))
-    return _finish(problem, nothing, status)
+    return finish(problem, nothing, status)
 
 
-def _finish(problem: Problem, found: Start, status: NDArray[np.str_]) -> Solution:
+def finish(problem: Problem, found: Start, status: NDArray[np.str_]) -> Solution:
+    """The result of b problems: NaN where the status is not OK, RMSE and covariance of the rest."""
     ok = status == Status.OK
     R, t = np.where(ok[:, None, None], found.R, np.nan), np.where(ok[:, None], found.t, np.nan)
     rmse = np.where(ok, _rmse(problem, R, t), np.nan)
