@@ -16,7 +16,7 @@ from eposit.planar import plane_axes
 from eposit.pose import Pose
 from eposit.posit import COPLANAR_CONDITION, Start, rectify_bearings
 from eposit.problem import Problem, mark, validate
-from eposit.quartic import FIRST, SECOND, critical_points, newton_step
+from eposit.quartic import FIRST, SECOND, ZERO, critical_points, newton_step
 from eposit.refine import refine_poses
 from eposit.solution import Solution, Status, join
 from eposit.solver import finish
@@ -33,7 +33,7 @@ class OpnpSolution(Solution):
     """A `Solution` with all real solutions of the polynomial system."""
 
     candidates: Candidates  # points behind the camera included; cost as `solve` defines it
-    pairs: Any  # number of distinct complex solution pairs +-x found: 40, an int or a (b,) array
+    pairs: Any  # distinct complex solution pairs +-x found: 40, fewer where some coincide or form curves; int or (b,)
 
     def first(self) -> OpnpSolution:
         """The single problem of a batch of one, without its leading axis."""
@@ -205,7 +205,7 @@ def _real(roots: Array, system: _System) -> tuple[NDArray[np.int64], Array, NDAr
             y[active] += step
             steps[active] += 1
             active = active[~(np.linalg.norm(step, axis=1) <= STEP_TOL * np.linalg.norm(y[active], axis=1))]
-    kept = np.setdiff1d(np.arange(len(row)), active)
+    kept = np.setdiff1d(np.flatnonzero(np.linalg.norm(y, axis=1) > ZERO), active)
     cost = _cost(system, row[kept], y[kept])
     by_cost = np.lexsort((cost, row[kept]))
     order = kept[by_cost]

@@ -10,6 +10,7 @@ leaves 40 dimensions, and multiplication by a linear form there is a 40 x 40 mat
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import combinations, combinations_with_replacement
 
@@ -22,10 +23,11 @@ from eposit.arrays import Array
 PAIRS = 40
 RANK = 125  # of the multiples of the minors in degree 8
 DISTINCT = 1e-12  # squared sine between the directions of two roots below which they are one
-DRAWS = 3  # sets of tables tried while roots are missing; about one problem in three thousand needs the second
-JITTER = 1e-6  # by which later draws change A before its roots are polished: symmetric problems can have curves of them
-POLISH_STEPS = 3  # complex Newton steps; the eigenvectors are good to 1e-4 or better
+JITTER = 1e-6  # relative change of A in the second search, before polishing: symmetric problems have curves of roots
+POLISH_STEPS = 3  # complex Newton steps in the first search, whose roots are good to 1e-4 or better
+MORE_STEPS = 8  # in the second
 ROOT_TOL = 1e-6  # relative size of the last of them above which a root is lost
+ZERO = 1e-6  # length, of about 1 otherwise, below which a root has run into y = 0
 FIRST, SECOND = np.triu_indices(4)  # v_k = y[FIRST[k]] * y[SECOND[k]]
 
 
@@ -41,8 +43,9 @@ class Tables:
     rows: NDArray[np.int64]  # (210, 35) columns, degree 8, of the multiples of the minors
     minor: NDArray[np.int64]  # (210,) the minor of each row
     chosen: NDArray[np.int64]  # (125,) rows that are independent
-    by_first: Array  # (40, 165): forty fixed forms of degree 7, times a linear form
-    by_second: Array  # (40, 165): the same forms, times another
+    by_first: Array  # (120, 165): the monomials of degree 7, times a linear form
+    by_second: Array  # (120, 165): times another linear form
+    mix: Array  # (40, 120): forty forms of degree 7
     powers: NDArray[np.int64]  # (4, 4) columns of y_i^7 y_j
 
 
@@ -53,8 +56,8 @@ def monomials(degree: int) -> list[tuple[int, ...]]:
 
 
 @functools.cache
-def tables(draw: int = 0) -> Tables:
-    """The tables, made once for each draw of what is arbitrary in them."""
+def tables() -> Tables:
+    """The tables, made once; what is arbitrary in them is drawn from fixed seeds."""
     one, two, three, four, eight = (monomials(degree) for degree in (1, 2, 3, 4, 8))
     in_three, in_four, in_eight = ({m: i for i, m in enumerate(each)} for each in (three, four, eight))
     symmetric = np.zeros((4, 4), np.int64)
@@ -71,35 +74,39 @@ def tables(draw: int = 0) -> Tables:
             product[k, j, in_four[_times(y, v)]] += 1.0
     rows = np.array([[in_eight[_times(a, b)] for b in four] for a in four for _ in range(6)])
     minor = np.tile(np.arange(6), 35)
-    by_first, by_second = _shifts(in_eight, draw)
+    by_first, by_second, mix = _shifts(in_eight)
     powers = np.array([[in_eight[_times(_power(i, 7), y)] for y in one] for i in range(4)])
     flat = cubic.reshape(100, 80), slopes.reshape(10, 16), product.reshape(80, 35)
-    return Tables(symmetric, slopes, *flat, rows, minor, _chosen(flat, rows, minor, draw), by_first, by_second, powers)
+    chosen = _chosen(flat, rows, minor)
+    return Tables(symmetric, slopes, *flat, rows, minor, chosen, by_first, by_second, mix, powers)
 
 
-def _chosen(
-    flat: tuple[Array, Array, Array], rows: NDArray[np.int64], minor: NDArray[np.int64], draw: int
-) -> NDArray[np.int64]:
+def _chosen(flat: tuple[Array, Array, Array], rows: NDArray[np.int64], minor: NDArray[np.int64]) -> NDArray[np.int64]:
     """Rows of the multiples that pivoting takes first in a random problem; they are independent in almost all."""
-    rng = np.random.default_rng((0, draw))
+    rng = np.random.default_rng(0)
     A, y = rng.normal(size=(8, 10)), rng.normal(size=4)
     forms = minors(*coefficients(A[None], -(A @ (y[FIRST] * y[SECOND]))[None], *flat[:2]), flat[2])
-    matrix = np.zeros((210, 165))
-    matrix[np.arange(210)[:, None], rows] = forms[0, minor]
-    _, order = qr(matrix.T, mode="r", pivoting=True)
+    _, order = qr(_multiples(forms[0], rows, minor).T, mode="r", pivoting=True)
     return np.sort(order[:RANK]).astype(np.int64)
 
 
-def _shifts(in_eight: dict[tuple[int, ...], int], draw: int) -> tuple[Array, Array]:
-    """Forty random forms of degree 7, each times two random linear forms, as rows over degree 8."""
-    rng = np.random.default_rng((1, draw))
-    forms = np.linalg.qr(rng.normal(size=(120, PAIRS)))[0].T
-    by_unknown = np.zeros((4, PAIRS, 165))
+def _multiples(forms: Array, rows: NDArray[np.int64], minor: NDArray[np.int64]) -> Array:
+    """(210, 165) multiples of degree 8 of the (6, 35) minors."""
+    matrix = np.zeros((210, 165))
+    matrix[np.arange(210)[:, None], rows] = forms[minor]
+    return matrix
+
+
+def _shifts(in_eight: dict[tuple[int, ...], int]) -> tuple[Array, Array, Array]:
+    """The monomials of degree 7 times two random linear forms, as rows over degree 8; forty random mixtures of them."""
+    rng = np.random.default_rng(1)
+    mix = np.linalg.qr(rng.normal(size=(120, PAIRS)))[0].T
+    linear = np.linalg.qr(rng.normal(size=(4, 2)))[0]
+    shifts = np.zeros((2, 120, 165))
     for j, y in enumerate(monomials(1)):
         for k, m in enumerate(monomials(7)):
-            by_unknown[j, :, in_eight[_times(y, m)]] += forms[:, k]
-    linear = np.linalg.qr(rng.normal(size=(4, 2)))[0]
-    return np.einsum("j,jkm->km", linear[:, 0], by_unknown), np.einsum("j,jkm->km", linear[:, 1], by_unknown)
+            shifts[:, k, in_eight[_times(y, m)]] = linear[j]
+    return shifts[0], shifts[1], mix
 
 
 def coefficients(A: Array, d: Array, cubic: Array, linear: Array) -> tuple[Array, Array]:
@@ -122,29 +129,30 @@ def critical_points(A: Array, d: Array) -> tuple[Array, NDArray[np.int64]]:
 
     A: (b, r, 10), d: (b, r), scaled so that A v and d are of one size for |y| about 1.
     """
-    y, pairs = _attempt(A, d, 0)
-    for draw in range(1, DRAWS):
-        again = np.flatnonzero(pairs < PAIRS)
-        if not len(again):
-            break
-        other, more = _attempt(A[again], d[again], draw)
+    y, pairs = _search(A, d, A, _quick, POLISH_STEPS)
+    again = np.flatnonzero(pairs < PAIRS)
+    if len(again):  # about one problem in three thousand
+        near = A[again] * (1.0 + JITTER * np.random.default_rng(2).normal(size=A.shape[1:]))
+        other, more = _search(A[again], d[again], near, _thorough, MORE_STEPS)
         better = more > pairs[again]
         y[again[better]], pairs[again[better]] = other[better], more[better]
     return y, pairs
 
 
-def _attempt(A: Array, d: Array, draw: int) -> tuple[Array, NDArray[np.int64]]:
-    fixed = tables(draw)
-    shaken = A * (1.0 + JITTER * draw * np.random.default_rng((2, draw)).normal(size=A.shape[1:]))
-    C, L = coefficients(shaken, d, fixed.cubic, fixed.linear)
+def _search(
+    A: Array, d: Array, near: Array, dual: Callable[[Array], tuple[Array, Array]], steps: int
+) -> tuple[Array, NDArray[np.int64]]:
+    """`critical_points` from those of |near v(y) + d|^2."""
+    fixed = tables()
+    C, L = coefficients(near, d, fixed.cubic, fixed.linear)
     with np.errstate(all="ignore"):
-        y = _scaled(_directions(minors(C, L, fixed.product), fixed), shaken, d)
+        y = _scaled(_directions(*dual(minors(C, L, fixed.product))), near, d)
         step = np.zeros_like(y)
-        for _ in range(POLISH_STEPS):
+        for _ in range(steps):
             step = newton_step(y, A, d)
             y = y + step
         size = np.linalg.norm(y, axis=2)
-        lost = ~(np.linalg.norm(step, axis=2) <= ROOT_TOL * size)
+        lost = ~((np.linalg.norm(step, axis=2) <= ROOT_TOL * size) & (size > ZERO))
         pairs = _distinct(y / size[..., None], ~lost)
     y[lost] = np.nan
     return y, pairs
@@ -174,18 +182,37 @@ def solve_or_nan(matrices: Array, right: Array) -> Array:
         return np.stack([solve_or_nan(matrix, side) for matrix, side in zip(matrices, right, strict=True)])
 
 
-def _directions(forms: Array, fixed: Tables) -> Array:
-    """(b, 40, 4) complex unit directions on which the (b, 6, 35) minors vanish."""
+def _quick(forms: Array) -> tuple[Array, Array]:
+    """(b, 165, 40) basis of the functionals that vanish on all multiples of the (b, 6, 35) minors, and (b, 40, 40)
+    multiplication by the ratio of the linear forms; from chosen multiples only, by one LU each.
+    """
+    fixed = tables()
     system = np.zeros((len(forms), 165, 165))
     system[:, np.arange(RANK)[:, None], fixed.rows[fixed.chosen]] = forms[:, fixed.minor[fixed.chosen]]
-    system[:, RANK:] = fixed.by_second
+    system[:, RANK:] = fixed.mix @ fixed.by_second
     right = np.zeros((165, PAIRS))
     right[RANK:] = np.eye(PAIRS)
-    dual = solve_or_nan(system, right)  # values of all monomials from those of the forty forms
-    ratio = fixed.by_first @ dual
+    dual = solve_or_nan(system, right)
+    return dual, (fixed.mix @ fixed.by_first) @ dual
+
+
+def _thorough(forms: Array) -> tuple[Array, Array]:
+    """The same from all multiples and all monomials of degree 7, by orthogonal steps."""
+    fixed, b = tables(), len(forms)
+    dual, ratio = np.zeros((b, 165, PAIRS)), np.full((b, PAIRS, PAIRS), np.nan)
+    for i, six in enumerate(forms):
+        if np.all(np.isfinite(six)):
+            basis, _, _ = qr(_multiples(six, fixed.rows, fixed.minor).T, pivoting=True)
+            dual[i] = basis[:, RANK:]
+            ratio[i] = np.linalg.lstsq(fixed.by_second @ dual[i], fixed.by_first @ dual[i], rcond=None)[0]
+    return dual, ratio
+
+
+def _directions(dual: Array, ratio: Array) -> Array:
+    """(b, 40, 4) complex unit directions from the eigenvectors of the multiplication."""
     good = np.all(np.isfinite(ratio), axis=(1, 2))
     _, vectors = np.linalg.eig(np.where(good[:, None, None], ratio, np.eye(PAIRS)))
-    values = dual[:, fixed.powers.ravel()] @ vectors.astype(np.complex128)  # real where all roots are
+    values = dual[:, tables().powers.ravel()] @ vectors.astype(np.complex128)  # real where all roots are
     values = np.moveaxis(values.reshape(-1, 4, 4, PAIRS), 3, 1)  # (b, 40, i, j) of y_i^7 y_j
     largest = np.argmax(np.abs(np.einsum("bkii->bki", values)), axis=2)
     y = np.take_along_axis(values, largest[..., None, None], axis=2)[:, :, 0]

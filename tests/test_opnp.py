@@ -93,11 +93,11 @@ def test_every_lens_below_90_degrees(camera):
 
 @pytest.mark.parametrize("lens", ["perspective", "orthogonal"])
 def test_noise_reaches_the_bound_as_opencvs_sqpnp_does(lens):
-    """0.4 px on every fifth frame of the paper's helix, ten draws each; errors over their own frame's bound."""
+    """0.4 px on every eighth frame of the paper's helix, ten draws each; errors over their own frame's bound."""
     camera = PINHOLE if lens == "perspective" else paper_camera(lens)
     rng, draws, sigma = np.random.default_rng(14), 10, 0.4
     ours, theirs, likeliest = [], [], []
-    for time in range(0, 361, 5):
+    for time in range(0, 361, 8):
         pose = helix_pose(time)
         pixels = camera.project(pose.apply(PAPER_OBJECT)) + sigma * rng.standard_normal((draws, 4, 2))
         bound = np.sqrt(np.diag(covariance(information(camera, PAPER_OBJECT, pose, sigma))[0]))
@@ -116,8 +116,8 @@ def test_noise_reaches_the_bound_as_opencvs_sqpnp_does(lens):
     ours, theirs, likeliest = (np.abs(np.vstack(errors)) for errors in (ours, theirs, likeliest))
     np.testing.assert_allclose(np.median(ours, axis=0), np.median(theirs, axis=0), rtol=0.03)
     assert ours.max() < 8.0  # no flips; SQPnP has some
-    # An RMS of 730 draws scatters by 1 / sqrt(1460) = 2.6 %: four of those.
-    np.testing.assert_allclose(np.sqrt(np.mean(ours**2, axis=0)), 1.0, atol=0.105)
+    # An RMS of 460 draws scatters by 1 / sqrt(920) = 3.3 %: four of those.
+    np.testing.assert_allclose(np.sqrt(np.mean(ours**2, axis=0)), 1.0, atol=0.132)
     # On the same draws the scatter cancels: the algebraic cost loses less than 1 % to maximum likelihood.
     np.testing.assert_allclose(np.sqrt(np.mean(ours**2, axis=0) / np.mean(likeliest**2, axis=0)), 1.0, atol=0.01)
 
@@ -147,12 +147,12 @@ def test_forty_pairs_in_closed_form(signs):
 def test_the_selected_pose_is_the_global_minimum_of_the_cost():
     """Quasi-Newton from random starts on the cost written out plainly finds nothing lower, and the same value."""
     rng = np.random.default_rng(6)
-    for seed in range(3):
+    for seed in range(2):
         points, pixels, image = noisy_image(seed)
         solution = opnp.solve(points, pixels, PINHOLE)
         depth = (solution.cam_from_obj.R @ points.mean(axis=0) + solution.cam_from_obj.t)[2]
         unit = points / depth  # quaternions of about unit length
-        lowest = min(minimum(unit, image, rng.normal(size=6)) for _ in range(15))
+        lowest = min(minimum(unit, image, rng.normal(size=6)) for _ in range(12))
         assert lowest == pytest.approx(solution.candidates.cost[0], rel=1e-6)  # where BFGS stops
 
 
@@ -180,6 +180,40 @@ def moved(points, R, t, step):
     turn, centre = Rotation.from_rotvec(step[:3]).as_matrix(), R @ points.mean(axis=0) + t
     centre = centre + step[3:] * centre[2]
     return turn @ R, centre - turn @ R @ points.mean(axis=0)
+
+
+def test_points_behind_the_camera_are_not_chosen():
+    """Images of nothing, on a wide picture: often the lowest cost belongs to a pose with points behind the camera."""
+    rng, camera, passed_over, none = np.random.default_rng(0), PINHOLE.replace(fx=345.0, fy=345.0), 0, 0
+    for _ in range(10):
+        points = rng.normal(size=(4, 3)) * 100.0
+        solution = opnp.solve(points, rng.uniform(0, 1600, (20, 4, 2)), camera)
+        for i, status in enumerate(solution.status):
+            k = solution.candidates.count[i]
+            poses = Pose(solution.candidates.poses.R[i, :k], solution.candidates.poses.t[i, :k])
+            front = np.flatnonzero(np.all(poses.apply(points)[..., 2] > 0.0, axis=1))
+            assert status == ("ok" if len(front) else "no_solution")
+            passed_over, none = passed_over + (len(front) > 0 and front[0] > 0), none + (len(front) == 0)
+            if len(front):
+                np.testing.assert_array_equal(solution.cam_from_obj.t[i], poses.t[front[0]])
+    assert passed_over > 20
+    assert none > 0
+
+
+def test_roots_that_merge_are_one_candidate():
+    """Between two images with a different number of real roots lies one where two of them meet."""
+    images = np.random.default_rng(2).uniform(400.0, 1000.0, (20, 4, 2))
+    counts = opnp.solve(PAPER_OBJECT, images, PINHOLE).candidates.count
+    other = np.flatnonzero(counts != counts[0])[0]
+    low, high = images[0], images[other]
+    for _ in range(50):
+        found = opnp.solve(PAPER_OBJECT, 0.5 * (low + high), PINHOLE)
+        k = found.candidates.count
+        apart = rotation_error_rad(found.candidates.poses.R[:, None], found.candidates.poses.R[None])
+        # A root of multiplicity two is known to the root of 1e-16.
+        assert apart[~np.eye(k, dtype=bool)].min(initial=1.0) > 1e-8
+        low, high = (0.5 * (low + high), high) if k == counts[0] else (low, 0.5 * (low + high))
+    assert found.status == "ok"
 
 
 def test_four_points_of_a_plane_are_enough():
