@@ -27,9 +27,10 @@ CLEAR_BLURS = 3.0  # blurs between a pixel and the next black square
 BAND_PX = 1.5  # pixels of the board around the circle, beyond that
 LEAST_PIXELS = 40
 STEPS, STOP = 60, 0.5  # step, in standard deviations, at which a fit has converged; it is still made
-START_SHADOW = (0.06, 0.06, 0.06)  # place and softness, radii
+START_SHADOW = (0.18, 0.18, 0.18)  # place and softness, in heights of the circle above the board
 SIZE_SPREAD = 0.003  # the board's map gives the size to this: nearer or farther it looks the same to five in a thousand
-SHADOW_SPREAD, SOFTNESS_MEAN, SOFTNESS_SPREAD = 0.3, 0.05, 0.05  # radii
+SHADOW_SPREAD, SOFTNESS_MEAN, SOFTNESS_SPREAD = 0.9, 0.15, 0.15  # heights
+FURTHEST_SHADOW = 3.6  # heights
 LEAST_CONTRAST = 0.35  # of the board's: what a circle's edge must have
 SEARCH_SHARE = 0.1  # of a square: how far the centre may lie from where the board predicts it
 SIZE_LIMIT = 0.03  # of the size
@@ -71,10 +72,11 @@ def find_circle(image: Grey, board: BoardMap, blur_px: float, contrast: float, t
     if patch is None:
         return None
     per_px = np.linalg.inv(jacobian) / radius
-    start, expected, spread = _beforehand(contrast)
+    start, expected, spread = _beforehand(contrast, target.circle_height_mm / target.circle_radius_mm)
     fitted, covariance, _, converged = fit_disc(
         patch.grey, patch.rows, patch.columns, patch.on_board, patch.on_disc, patch.fields, per_px,
-        _kernel(blur_px, patch.finer), patch.finer, start, expected, spread, STEPS, STOP,
+        _kernel(blur_px, patch.finer), patch.finer, start, expected, spread,
+        FURTHEST_SHADOW * target.circle_height_mm / target.circle_radius_mm, STEPS, STOP,
     )  # fmt: skip
     shift = fitted[:2]
     found = converged and np.linalg.norm(shift) * radius < SEARCH_SHARE and abs(fitted[SIZE] - 1.0) < SIZE_LIMIT
@@ -84,13 +86,16 @@ def find_circle(image: Grey, board: BoardMap, blur_px: float, contrast: float, t
     return Circle(centre + to_px @ shift, to_px @ covariance[:2, :2] @ to_px.T)
 
 
-def _beforehand(contrast: float) -> tuple[Array, Array, Array]:
-    """Start of the shape, and mean and spread of all that `fit_disc` fits; what is not known has a wide spread."""
-    start = np.array([0.0, 0.0, 1.0, *START_SHADOW])
+def _beforehand(contrast: float, height: float) -> tuple[Array, Array, Array]:
+    """Start of the shape, and mean and spread of all that `fit_disc` fits; what is not known has a wide spread.
+
+    height: of the circle above the board, radii.
+    """
+    start = np.array([0.0, 0.0, 1.0, *(height * share for share in START_SHADOW)])
     expected, spread = np.zeros(12), np.full(12, 1e6)
     expected[SIZE], spread[SIZE] = 1.0, SIZE_SPREAD
-    spread[3:5] = SHADOW_SPREAD
-    expected[SOFTNESS], spread[SOFTNESS] = SOFTNESS_MEAN, SOFTNESS_SPREAD
+    spread[3:5] = height * SHADOW_SPREAD
+    expected[SOFTNESS], spread[SOFTNESS] = height * SOFTNESS_MEAN, height * SOFTNESS_SPREAD
     spread[8:10] = 0.5 * contrast
     expected[10], spread[10] = 0.3 * contrast, 0.3 * contrast
     expected[11], spread[11] = 0.6 * contrast, 0.6 * contrast

@@ -19,7 +19,8 @@ START_BLUR_PX = 0.8
 REACH, LEAST_REACH = 0.55, 0.25  # squares from the corner; at most this far, at least this far
 CLEAR_BLURS = 2.6  # blurs to keep between a fit's pixels and the next edge
 CIRCLE_MARGIN_PX = 2.5  # kept clear around the circle and its shade: three times a sharp picture's blur
-HIDDEN_PARALLAX = 0.3  # squares: a larger one is an ambiguous map's invention
+FARTHEST_PARALLAX = 3.0  # heights of the circle: a larger one is an ambiguous map's invention
+SMALL_PARALLAX = 0.3  # squares: up to here the circle may be displaced either way, which a small tilt leaves open
 START_LIMIT = 0.3  # of the local square: a fit that moves further has gone to another corner
 LIMIT_PX = 0.5  # largest distance of a corner from the map through the others
 LIMIT_SHARE = 0.03  # or this share of the local square, whichever is more
@@ -116,10 +117,10 @@ def _around_circle(board: BoardMap, target: Target) -> tuple[Array, Array]:
     base, jacobian = board(foot), board.jacobian(foot)
     inverse = np.linalg.inv(jacobian)
     parallax = board(foot, height) - base
-    if np.linalg.norm(inverse @ parallax) > HIDDEN_PARALLAX:
-        parallax = np.zeros(2)
+    squares = float(np.linalg.norm(inverse @ parallax))
+    ways = [0.0] if squares > FARTHEST_PARALLAX * height else [0.0, 1.0, -1.0][: 3 if squares <= SMALL_PARALLAX else 2]
     radius = target.circle_radius_mm / target.square_mm + CIRCLE_MARGIN_PX * np.linalg.norm(inverse, axis=1).max()
-    return base + np.array([[0.0], [1.0], [-1.0]]) * parallax, inverse / radius
+    return base + np.array(ways)[:, None] * parallax, inverse / radius
 
 
 def _checked(corners: Corners, at: Array, size: tuple[int, int], prior: float = PRIOR_FREEDOM) -> Corners:

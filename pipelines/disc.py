@@ -25,7 +25,7 @@ Places = NDArray[np.intp]
 SHAPE, LINEAR = 6, 6
 SIZE, SOFTNESS, CONTRAST_FROM, CONTRAST_TO = 2, 5, 7, 6
 FURTHEST_STEP = np.array([0.15, 0.15, 0.02, 0.15, 0.15, 0.05])  # in one iteration
-FURTHEST_SHADOW, SOFTNESS_LIMITS = 1.2, (0.01, 0.6)
+SOFTNESS_LIMITS = (0.01, 0.6)
 ROUNDING = 1.0 / 12.0  # variance of a grey value that was rounded: no picture is better known
 
 
@@ -103,6 +103,7 @@ def fit_disc(
     start: Array,
     expected: Array,
     spread: Array,
+    furthest: float,
     steps: int,
     stop: float,
 ) -> tuple[Array, Array, float, bool]:
@@ -111,8 +112,8 @@ def fit_disc(
     grey: (n,) values of the pixels at rows, columns (n,) of the patch. u, v: (2, h, w) places of the fine grid on the
     board and on the disc's plane, in radii. fields: (3, h, w) slopes x, y in radii and the blocked share. per_px:
     (2, 2) radii per px. kernel: (k,) taps of the blur on the fine grid, `finer` cells to a pixel. start: (6,) shape.
-    expected, spread: (12,) what is known beforehand, as mean and standard deviation. stop: step, in standard deviations
-    of what is fitted, at which it has converged.
+    expected, spread: (12,) what is known beforehand, as mean and standard deviation. furthest: of the shadow, radii.
+    stop: step, in standard deviations of what is fitted, at which it has converged.
 
     Returns:
         (12,) the fit, (12, 12) covariance, standard deviation of the residuals where they tell the place, convergence.
@@ -175,7 +176,7 @@ def fit_disc(
         trial[:] = p
         for k in range(SHAPE):
             trial[k] += min(max(step[k], -FURTHEST_STEP[k]), FURTHEST_STEP[k])
-        trial[3] = min(max(trial[3], -FURTHEST_SHADOW), FURTHEST_SHADOW)
-        trial[4] = min(max(trial[4], -FURTHEST_SHADOW), FURTHEST_SHADOW)
+        trial[3] = min(max(trial[3], -furthest), furthest)
+        trial[4] = min(max(trial[4], -furthest), furthest)
         trial[SOFTNESS] = min(max(trial[SOFTNESS], SOFTNESS_LIMITS[0]), SOFTNESS_LIMITS[1])
     return p, np.linalg.inv(normal) * noise, math.sqrt(noise), converged

@@ -22,6 +22,8 @@ class Entry:
 
 
 SOLVERS: dict[str, Entry] = {
+    "released": Entry("eposit.released:solve", theta_centre=True),
+    "opnp": Entry("eposit.opnp:solve"),
     "opencv-sqpnp": Entry("pipelines.solvers.with_opencv:sqpnp"),
     "opencv-epnp": Entry("pipelines.solvers.with_opencv:epnp"),
     "opencv-iterative": Entry("pipelines.solvers.with_opencv:iterative"),
@@ -29,7 +31,6 @@ SOLVERS: dict[str, Entry] = {
     "opencv-fisheye": Entry("pipelines.solvers.with_opencv:fisheye"),
     "poselib-p3p": Entry("pipelines.solvers.with_poselib:p3p", points=4),
     "poselib-p4pf": Entry("pipelines.solvers.with_poselib:p4pf", points=4),
-    # The compared solvers of `eposit` stand here, each as "NAME": Entry("eposit.NAME:solve").
 }
 
 
