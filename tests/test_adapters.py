@@ -10,6 +10,7 @@ from datasets.errors import UserError
 from eposit.pose import rotation_error_rad
 from pipelines.commands import options
 from pipelines.solvers.names import SOLVERS, check_solver, find_solver, solver_names, takes_four, takes_theta_centre
+from pipelines.stages import settings_of
 from tests.cameras import ALL_CAMERAS, PAPER_OBJECT, PAST_90, helix_pose, paper_camera, random_object, random_pose
 
 SIX_POINTS = ("opencv-sqpnp", "opencv-epnp", "opencv-iterative")
@@ -166,6 +167,8 @@ def test_names():
     assert [name for name in solver_names() if takes_theta_centre(name)] == ["eposit"]
     for name in solver_names():
         check_solver(name, "four")
+    assert {setting.use for setting in settings_of(["opencv-p3p"])} == {"four"}
+    assert {setting.use for setting in settings_of(["opencv-epnp"])} == {"all"}
     with pytest.raises(UserError, match="poselib-p3p takes exactly four points; add --use four"):
         check_solver("poselib-p3p", "all")
     with pytest.raises(UserError, match=r"unknown solver 'upnp'; choose one of best, .* package\.module:function"):
