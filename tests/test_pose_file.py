@@ -138,6 +138,19 @@ def test_missing_rows_and_empty_poses_are_failures(poses, root, tmp_path, cli):
     assert [row["status"] for row in made(root, "scores", "c")] == ["ok", "no_solution"]
 
 
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_a_status_in_the_file_is_kept(suffix, poses, root, tmp_path, cli):
+    zero = dict.fromkeys((*Q, *T), 0.0)
+    path = write(tmp_path / f"p{suffix}", [poses[0] | zero | {"status": "lost"}, poses[1] | {"status": "ok"}])
+    assert cli("score", root, "--poses", path, "--name", "theirs", "-q").code == 0
+    rows = made(root, "scores")
+    assert [row["status"] for row in rows] == ["lost", "ok"]
+    assert np.isnan(rows[0]["rotation_error_deg"])
+    path = write(tmp_path / f"p{suffix}", [poses[0] | {"status": "OK"}, poses[1] | {"status": None}])
+    assert cli("score", root, "--poses", path, "--name", "theirs", "-q").code == 0
+    assert [row["status"] for row in made(root, "scores")] == ["ok", "ok"]
+
+
 @pytest.mark.parametrize("decimals", [4, 15])
 def test_rounded_poses_are_taken(decimals, poses, root, tmp_path, cli):
     text = "frame_id, q_w, q_x, q_y, q_z, tx, ty, tz, note\r\n\r\n"

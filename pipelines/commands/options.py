@@ -45,7 +45,7 @@ PoseFile = Annotated[
 PosesName = Annotated[str | None, typer.Option("--name", help="Name of the poses of --poses in tables and report.")]
 Again = Annotated[bool, typer.Option("--again", help="Estimate anew what is there, as your function has changed.")]
 PointsName = Annotated[str, typer.Option("--points", help="detected, truth or truth+noise.")]
-CameraName = Annotated[str, typer.Option("--camera", help="Camera the solver assumes: exact, nominal or paper.")]
+CameraName = Annotated[str, typer.Option("--camera", help="Camera that is assumed: exact, nominal or paper.")]
 Use = Annotated[str, typer.Option("--use", help="Object points: four or all.")]
 NoisePx = Annotated[float, typer.Option("--noise-px", help="Standard deviation of truth+noise, px per axis.")]
 Draws = Annotated[int, typer.Option("--draws", help="Draws of truth+noise.")]
