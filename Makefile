@@ -3,8 +3,10 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 SETUP := $(VENV)/.done
+BLENDER := .venv-blender
+BLENDER_PYTHON ?= $(PYTHON)
 
-.PHONY: help setup demo test test-full check-slow lint types layers bench wheel lock clean
+.PHONY: help setup demo test test-full check-slow lint types layers bench bench-blender wheel lock clean
 
 help:  ## this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 14
@@ -43,6 +45,15 @@ layers: $(SETUP)  ## the layer contract
 bench: $(SETUP)  ## speed, as ratios measured side by side in one run
 	$(BIN)/python -m pipelines bench
 
+bench-blender: $(SETUP) $(BLENDER)/.done  ## the same against Blender's Cycles; downloads 350 MB
+	EPOSIT_BLENDER=$(BLENDER)/bin/python $(BIN)/python -m pipelines bench --only blender
+
+$(BLENDER)/.done:
+	$(BLENDER_PYTHON) -m venv --clear $(BLENDER)
+	$(BLENDER)/bin/python -m pip install --quiet --disable-pip-version-check --only-binary bpy bpy || \
+		{ echo "bpy has wheels for some Pythons only, as 3.11 and 3.13; set BLENDER_PYTHON=..."; exit 1; }
+	@touch $@
+
 wheel: $(SETUP)  ## the library `eposit` as a wheel in dist/
 	$(BIN)/python -m build --wheel --no-isolation
 
@@ -52,4 +63,4 @@ lock: $(SETUP)  ## pin every dependency again
 		--extra lab --extra dev --quiet -o requirements.txt pyproject.toml requirements-build.in
 
 clean:  ## everything that was made
-	rm -rf $(VENV) out build dist *.egg-info
+	rm -rf $(VENV) $(BLENDER) out build dist *.egg-info

@@ -115,7 +115,7 @@ def posit(
                 break
             vectors = _solve_scaled(solver, xa, ya, epsilon)
             scale, k = _scale_and_axis(vectors)
-            epsilon = epsilon + step * (scale * _rows(offsets, k) - epsilon)
+            epsilon = epsilon + step * (scale * rows(offsets, k) - epsilon)
             change = np.max(np.abs(vectors - previous), axis=0) / scale
             iterations[active] += 1
             stacked[:, active] = vectors
@@ -126,7 +126,7 @@ def posit(
             if not np.all(keep):
                 active, xa, ya = active[keep], xa[:, keep], ya[:, keep]
                 epsilon, previous = epsilon[:, keep], previous[:, keep]
-        R, t = _pose(stacked, x[0], y[0])
+        R, t = _pose(stacked, x[0], y[0], points_in_obj[0])
     lost = ~converged
     R[lost], t[lost] = np.nan, np.nan
     return Start(R, t, iterations, converged)
@@ -175,10 +175,10 @@ def _misfit(points_in_obj: Array, x: Array, y: Array, R: Array, t: Array) -> tup
 def _solve_scaled(solver: Array, x: Array, y: Array, epsilon: Array) -> Array:
     """I and J, (6, b), from the right-hand sides xi and eta (paper, equations 21 to 25)."""
     factor = 1.0 + epsilon
-    return np.concatenate((_rows(solver, factor * x[1:] - x[0]), _rows(solver, factor * y[1:] - y[0])))
+    return np.concatenate((rows(solver, factor * x[1:] - x[0]), rows(solver, factor * y[1:] - y[0])))
 
 
-def _rows(matrix: Array, columns: Array) -> Array:
+def rows(matrix: Array, columns: Array) -> Array:
     """matrix @ columns with a fixed order of additions, so that a batch gives the bits of single calls."""
     total = matrix[:, :1] * columns[0]
     for j in range(1, matrix.shape[1]):
@@ -189,21 +189,27 @@ def _rows(matrix: Array, columns: Array) -> Array:
 def _scale_and_axis(vectors: Array) -> tuple[Array, Array]:
     """Scale 1 / Z0, the mean length of I and J, and the unit third axis k."""
     i, j = vectors[:3], vectors[3:]
-    scale = 0.5 * (_norm(i) + _norm(j))
+    scale = 0.5 * (norm(i) + norm(j))
     k = cross(i, j)
-    return scale, k / _norm(k)
+    return scale, k / norm(k)
 
 
-def _pose(vectors: Array, x0: Array, y0: Array) -> tuple[Array, Array]:
-    """Rotation with rows i, j, k, made orthogonal by sharing the defect between i and j, and position of M0."""
-    i, j = vectors[:3] / _norm(vectors[:3]), vectors[3:] / _norm(vectors[3:])
-    depth = 2.0 / (_norm(vectors[:3]) + _norm(vectors[3:]))
+def nearest_frame(vectors: Array) -> Array:
+    """(b, 3, 3) rotations with rows i, j, k from I above J, (6, b), the defect shared between i and j."""
+    i, j = vectors[:3] / norm(vectors[:3]), vectors[3:] / norm(vectors[3:])
     total, difference = i + j, i - j
-    total, difference = total / _norm(total), difference / _norm(difference)
+    total, difference = total / norm(total), difference / norm(difference)
     i, j = (total + difference) * np.sqrt(0.5), (total - difference) * np.sqrt(0.5)
-    rotation = np.stack((i, j, cross(i, j)))
-    return np.ascontiguousarray(rotation.transpose(2, 0, 1)), np.stack((x0 * depth, y0 * depth, depth), axis=-1)
+    return np.ascontiguousarray(np.stack((i, j, cross(i, j))).transpose(2, 0, 1))
 
 
-def _norm(vector: Array) -> Array:
+def _pose(vectors: Array, x0: Array, y0: Array, first: Array) -> tuple[Array, Array]:
+    """Rotation and position of the object frame from I above J and M0's pinhole and object coordinates."""
+    rotation = nearest_frame(vectors)
+    depth = 2.0 / (norm(vectors[:3]) + norm(vectors[3:]))
+    return rotation, np.stack((x0 * depth, y0 * depth, depth), axis=-1) - rotation @ first
+
+
+def norm(vector: Array) -> Array:
+    """Length of (3, ...) vectors along the first axis."""
     return np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)

@@ -21,6 +21,7 @@ class Status(StrEnum):
     FIELD_ANGLE = "field_angle"  # a point at or beyond 90 degrees, where POSIT and EPOSIT have no equations
     COPLANAR = "coplanar"  # the points lie in one plane and the method cannot take that
     NOT_CONVERGED = "not_converged"  # the iteration stopped before its step fell below the tolerance
+    NO_SOLUTION = "no_solution"  # no real solution of the equations has all points in front of the camera
     INCONSISTENT = "inconsistent"  # converged, but to a pose that does not reproduce the image points
 
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -12,28 +9,13 @@ from eposit.arrays import Array, Mask
 from eposit.camera import Camera
 from eposit.pose import Pose
 from eposit.posit import COPLANAR_CONDITION, Start, condition, posit_checked, rectify_bearings, rectify_paper
+from eposit.problem import Problem, mark, validate
 from eposit.refine import Refined, covariance, normal_equations, refine_poses, residuals, whitening
-from eposit.solution import STATUS_TYPE, Solution, Status, join
+from eposit.solution import Solution, Status, join
 from eposit.starts import centred_points, rim_bearings, starts, turn_back
 
 METHODS = ("best", "centred", "eposit", "posit")
 CHUNK = 4096  # problems worked on at a time
-
-
-@dataclass(frozen=True, slots=True)
-class _Problem:
-    """Validated input: b images of the same n object points."""
-
-    points_in_obj: Array  # (n, 3)
-    points_px: Array  # (b, n, 2), zeros where a row is not usable
-    camera: Camera
-    status: NDArray[np.str_]  # (b,), OK where the row is usable so far
-    weights: Array  # (2, 2, n)
-    absolute: bool  # whether the covariance is absolute: sigma_px was given
-
-    @property
-    def uv(self) -> tuple[Array, Array]:
-        return self.points_px[..., 0].T, self.points_px[..., 1].T
 
 
 def solve(
@@ -71,9 +53,9 @@ def solve(
         raise ValueError(f"unknown method {method!r}; known methods are {', '.join(METHODS)}")
     if theta_centre is not None and method != "eposit":
         raise ValueError(f"theta_centre goes with method 'eposit', not {method!r}; leave it out")
-    problem, single = _validate(points_in_obj, points_px, camera, sigma_px)
+    problem, single = validate(points_in_obj, points_px, camera, sigma_px)
     parts: list[Solution] = []
-    for part in _chunks(problem):
+    for part in problem.chunks(CHUNK):
         if method == "best":
             parts.append(_solve_best(part, refine))
         else:
@@ -81,72 +63,43 @@ def solve(
     return parts[0].first() if single else join(parts)
 
 
-def _chunks(problem: _Problem) -> Iterator[_Problem]:
-    """The batch in pieces whose arrays stay in the cache; an empty batch is one piece."""
-    for i in range(0, max(1, len(problem.status)), CHUNK):
-        rows = slice(i, i + CHUNK)
-        yield replace(problem, points_px=problem.points_px[rows], status=problem.status[rows])
-
-
-def _validate(
-    points_in_obj: ArrayLike, points_px: ArrayLike, camera: Camera, sigma_px: ArrayLike | None
-) -> tuple[_Problem, bool]:
-    obj = np.asarray(points_in_obj, dtype=np.float64)
-    pixels = np.asarray(points_px, dtype=np.float64)
-    if obj.ndim != 2 or obj.shape[1] != 3:
-        raise ValueError(f"points_in_obj has shape {obj.shape}; it must be (n, 3)")
-    if len(obj) < 4:
-        raise ValueError(f"points_in_obj has {len(obj)} points; a pose needs at least 4")
-    if not np.all(np.isfinite(obj)):
-        raise ValueError("points_in_obj has NaN or infinite coordinates; give finite ones")
-    if pixels.ndim not in (2, 3) or pixels.shape[-2:] != (len(obj), 2):
-        raise ValueError(f"points_px has shape {pixels.shape}; it must be ({len(obj)}, 2) or (b, {len(obj)}, 2)")
-    single = pixels.ndim == 2
-    pixels = pixels[None] if single else pixels
-    finite = np.all(np.isfinite(pixels), axis=(1, 2))
-    status = np.where(finite, Status.OK, Status.NON_FINITE).astype(STATUS_TYPE)
-    pixels = np.where(finite[:, None, None], pixels, 0.0)
-    weights = whitening(None if sigma_px is None else np.asarray(sigma_px, dtype=np.float64), len(obj))
-    return _Problem(obj, pixels, camera, status, weights, sigma_px is not None), single
-
-
 def _solve_linear(
-    problem: _Problem, method: str, tol: float, max_iterations: int, theta_centre: tuple[float, float] | None
+    problem: Problem, method: str, tol: float, max_iterations: int, theta_centre: tuple[float, float] | None
 ) -> Solution:
     status = problem.status.copy()
     bearings = problem.camera.bearing(problem.points_px)
-    _mark(status, _any_row(np.isnan(bearings)), Status.OUTSIDE_LENS)
+    mark(status, _any_row(np.isnan(bearings)), Status.OUTSIDE_LENS)
     if condition(problem.points_in_obj) > COPLANAR_CONDITION:
         return _coplanar(problem, status)
     back = np.broadcast_to(np.eye(3), (len(status), 3, 3))
     if method == "centred":
         x, y, back = centred_points(bearings)
     else:
-        _mark(status, np.any(bearings[..., 2] <= 0.0, axis=1), Status.FIELD_ANGLE)
+        mark(status, np.any(bearings[..., 2] <= 0.0, axis=1), Status.FIELD_ANGLE)
         if method == "eposit":
             x, y = rectify_paper(problem.points_px, problem.camera, theta_centre)
         else:
             x, y = rectify_bearings(bearings)
     start, reproduces = posit_checked(problem.points_in_obj, x, y, tol, max_iterations)
-    _mark(status, ~start.converged, Status.NOT_CONVERGED)
-    _mark(status, ~reproduces, Status.INCONSISTENT)
-    return _finish(problem, turn_back(back, start), status)
+    mark(status, ~start.converged, Status.NOT_CONVERGED)
+    mark(status, ~reproduces, Status.INCONSISTENT)
+    return finish(problem, turn_back(back, start), status)
 
 
-def _solve_best(problem: _Problem, refined: bool) -> Solution:
+def _solve_best(problem: Problem, refined: bool) -> Solution:
     status = problem.status.copy()
     bearings = rim_bearings(problem.camera, problem.points_px)
-    _mark(status, _any_row(np.isnan(bearings)), Status.OUTSIDE_LENS)
+    mark(status, _any_row(np.isnan(bearings)), Status.OUTSIDE_LENS)
     found = starts(problem.points_in_obj, bearings)
     if not found:
         return _coplanar(problem, status)
     candidates = _candidates(problem, found, refined)
     best = _lowest(candidates, len(found))
-    _mark(status, ~(best.converged & np.isfinite(best.cost)), Status.NOT_CONVERGED)
-    return _finish(problem, Start(best.R, best.t, best.steps, best.converged), status)
+    mark(status, ~(best.converged & np.isfinite(best.cost)), Status.NOT_CONVERGED)
+    return finish(problem, Start(best.R, best.t, best.steps, best.converged), status)
 
 
-def _candidates(problem: _Problem, found: list[Start], refined: bool) -> Refined:
+def _candidates(problem: Problem, found: list[Start], refined: bool) -> Refined:
     """All starts of all problems as one batch, start by start, refined or as they are."""
     u, v = (np.tile(pixels, (1, len(found))) for pixels in problem.uv)
     R, t = np.concatenate([start.R for start in found]), np.concatenate([start.t for start in found])
@@ -168,7 +121,7 @@ def _lowest(candidates: Refined, starts_each: int) -> Refined:
     return Refined(R, t, candidates.cost[rows], candidates.steps[rows], converged)
 
 
-def _rmse(problem: _Problem, R: Array, t: Array) -> Array:
+def _rmse(problem: Problem, R: Array, t: Array) -> Array:
     u, v = problem.uv
     plain = whitening(None, len(problem.points_in_obj))
     with np.errstate(invalid="ignore", over="ignore"):
@@ -180,19 +133,15 @@ def _any_row(values: Mask) -> Mask:
     return np.asarray(np.any(values, axis=tuple(range(1, values.ndim))))
 
 
-def _mark(status: NDArray[np.str_], failed: Mask, reason: Status) -> None:
-    """Give rows that are still OK a reason to fail; the first reason stays."""
-    status[failed & (status == Status.OK)] = reason
-
-
-def _coplanar(problem: _Problem, status: NDArray[np.str_]) -> Solution:
-    _mark(status, np.ones(len(status), bool), Status.COPLANAR)
+def _coplanar(problem: Problem, status: NDArray[np.str_]) -> Solution:
+    mark(status, np.ones(len(status), bool), Status.COPLANAR)
     b = len(status)
     nothing = Start(np.full((b, 3, 3), np.nan), np.full((b, 3), np.nan), np.zeros(b, np.int64), np.zeros(b, bool))
-    return _finish(problem, nothing, status)
+    return finish(problem, nothing, status)
 
 
-def _finish(problem: _Problem, found: Start, status: NDArray[np.str_]) -> Solution:
+def finish(problem: Problem, found: Start, status: NDArray[np.str_]) -> Solution:
+    """The result of b problems: NaN where the status is not OK, RMSE and covariance of the rest."""
     ok = status == Status.OK
     R, t = np.where(ok[:, None, None], found.R, np.nan), np.where(ok[:, None], found.t, np.nan)
     rmse = np.where(ok, _rmse(problem, R, t), np.nan)

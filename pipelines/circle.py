@@ -7,9 +7,11 @@ how far the height displaces the circle, is fitted (`pipelines.disc`).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from eposit.arrays import Array, Mask
@@ -24,7 +26,7 @@ LARGE_PX = 45  # side of a patch from which the blur is well sampled by the coar
 CLEAR_BLURS = 3.0  # blurs between a pixel and the next black square
 BAND_PX = 1.5  # pixels of the board around the circle, beyond that
 LEAST_PIXELS = 40
-STEPS, STOP = 60, 0.2  # step, in standard deviations, at which a fit has converged
+STEPS, STOP = 60, 0.5  # step, in standard deviations, at which a fit has converged; it is still made
 START_SHADOW = (0.06, 0.06, 0.06)  # place and softness, radii
 SIZE_SPREAD = 0.003  # the board's map gives the size to this: nearer or farther it looks the same to five in a thousand
 SHADOW_SPREAD, SOFTNESS_MEAN, SOFTNESS_SPREAD = 0.3, 0.05, 0.05  # radii
@@ -124,25 +126,28 @@ def _patch(
     blocked = blocked_share(np.hypot(*on_board), 1.0, height / radius)
     shape = (high[1] - low[1], finer, high[0] - low[0], finer)
     squares = (planes[0].reshape(2, *shape)).mean(axis=(2, 4))
-    rows, columns = np.nonzero(
-        _on_white(squares, CLEAR_BLURS * blur_px * np.linalg.norm(np.linalg.inv(jacobian), axis=1), target)
+    margin, white = (
+        CLEAR_BLURS * blur_px * np.linalg.norm(np.linalg.inv(jacobian), axis=1),
+        np.empty(squares[0].shape, bool),
     )
+    _on_white(squares[0], squares[1], margin, target.columns, target.rows, target.margin_squares, white)
+    rows, columns = np.nonzero(white)
     if len(rows) < LEAST_PIXELS:
         return None
     grey = image[low[1] : high[1], low[0] : high[0]].astype(np.float64)[rows, columns]
     return _Patch(grey, rows, columns, on_board, on_disc, np.stack((*slopes, blocked)), finer)
 
 
-def _on_white(squares: Array, margin: Array, target: Target) -> Mask:
-    """(h, w) board coordinates (2, h, w) that lie on white and `margin` (2,) squares away from black and the border."""
-    white = np.ones(squares.shape[1:], bool)
-    for side_x in (-1.0, 0.0, 1.0):
-        for side_y in (-1.0, 0.0, 1.0):
-            x, y = squares[0] + margin[0] * side_x, squares[1] + margin[1] * side_y
-            column, row = np.floor(x) + 1.0, np.floor(y) + 1.0
-            on_squares = (column >= 0) & (column < target.columns) & (row >= 0) & (row < target.rows)
-            inside = (np.abs(x - (target.columns - 2) / 2.0) < target.columns / 2.0 + target.margin_squares) & (
-                np.abs(y - (target.rows - 2) / 2.0) < target.rows / 2.0 + target.margin_squares
-            )
-            white &= inside & ~(on_squares & ((column + row) % 2 == 0))
-    return white
+@njit(cache=True)
+def _on_white(x: Array, y: Array, margin: Array, columns: int, rows: int, border: float, out: Mask) -> None:
+    """Which board coordinates x, y (h, w) lie on white and `margin` (2,) squares away from black and the border."""
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] = True
+            for k in range(9):
+                u, v = x[i, j] + (k % 3 - 1) * margin[0], y[i, j] + (k // 3 - 1) * margin[1]
+                column, row = math.floor(u) + 1, math.floor(v) + 1
+                inside = -1.0 - border < u < columns - 1 + border and -1.0 - border < v < rows - 1 + border
+                black = 0 <= column < columns and 0 <= row < rows and (column + row) % 2 == 0
+                if black or not inside:
+                    out[i, j] = False

@@ -14,7 +14,7 @@ from render.target import Target
 
 FIRST_WINDOW_PX, WINDOW_PX = 5, 10  # half side of the pixels that the first and the final fit may use
 FIRST_STEPS, STEPS = 5, 12
-FIRST_STOP, STOP = 0.5, 0.1  # steps, in standard deviations, at which a fit has converged
+STOP = 0.5  # step, in standard deviations, at which a fit has converged; it is still made
 START_BLUR_PX = 0.8
 REACH, LEAST_REACH = 0.55, 0.25  # squares from the corner; at most this far, at least this far
 CLEAR_BLURS = 2.6  # blurs to keep between a fit's pixels and the next edge
@@ -44,14 +44,15 @@ class Corners:
 def refine_corners(image: Grey, board: BoardMap, target: Target) -> Corners:
     """Fit every corner near where `board` puts it, clear of the circle: once near by, then over the whole window."""
     at, size = grid(target.inner), (image.shape[1], image.shape[0])
-    fitted = _fit(image, board, target, _start_shapes(board, at, START_BLUR_PX), FIRST_WINDOW_PX, FIRST_STEPS)
-    if np.mean(~fitted.consistent) > 0.5:
-        return fitted
-    near = replace(fitted, board=BoardMap.fit(at, fitted.points_px, size, fitted.consistent * 1.0, board))
-    shapes = _start_shapes(near.board, at, near.blur_px)
-    shapes[near.consistent, :2] = near.points_px[near.consistent] - near.board(at)[near.consistent]
-    fitted = _fit(image, near.board, target, shapes, WINDOW_PX, STEPS)
-    return _checked(fitted, at, size)
+    near, found = _fit(image, board, target, _start_shapes(board, at, START_BLUR_PX), FIRST_WINDOW_PX, FIRST_STEPS)
+    good = near.consistent
+    if np.mean(~good) > 0.5:
+        return near
+    board = BoardMap.fit(at, near.points_px, size, good * 1.0, board)
+    shapes = _start_shapes(board, at, near.blur_px)
+    shapes[good, :2] = near.points_px[good] - board(at)[good]
+    shapes[good, MEAN:] = found[good, MEAN:]
+    return _checked(_fit(image, board, target, shapes, WINDOW_PX, STEPS)[0], at, size)
 
 
 def unrefined(points_px: Array, fitted: Corners, at: Array, size: tuple[int, int]) -> Corners:
@@ -74,17 +75,16 @@ def _start_shapes(board: BoardMap, at: Array, blur_px: float) -> Array:
     return shapes
 
 
-def _fit(image: Grey, board: BoardMap, target: Target, shapes: Array, window: int, steps: int) -> Corners:
-    """One pass over all corners; consistent is what converged to a corner of the right sense near its start."""
+def _fit(image: Grey, board: BoardMap, target: Target, shapes: Array, window: int, steps: int) -> tuple[Corners, Array]:
+    """One pass over all corners, and their shapes; consistent is what converged to a corner of the right sense."""
     at = grid(target.inner)
     starts, jacobian = board(at), board.jacobian(at)
     lengths = np.linalg.norm(jacobian, axis=1)
     reach = np.clip(1.0 - CLEAR_BLURS * shapes[:, BLUR, None] / lengths, LEAST_REACH, REACH)
     discs, disc_axes = _around_circle(board, target)
-    stop = FIRST_STOP if window == FIRST_WINDOW_PX else STOP
     fitted, covariance, noise, converged = fit_corners(
         image, starts, shapes, board.curvatures(at, jacobian), np.linalg.inv(jacobian), reach, window, discs,
-        disc_axes, steps, stop,
+        disc_axes, steps, STOP,
     )  # fmt: skip
     points = fitted[:, :2]
     with np.errstate(invalid="ignore"):
@@ -94,11 +94,11 @@ def _fit(image: Grey, board: BoardMap, target: Target, shapes: Array, window: in
         good &= np.all(np.isfinite(covariance), axis=(1, 2)) & (np.linalg.det(covariance) > 0.0)
         good &= converged if window == WINDOW_PX else True
     if not np.any(good):
-        return Corners(points, covariance, good, np.nan, np.nan, board)
+        return Corners(points, covariance, good, np.nan, np.nan, board), fitted
     # A corner's own few pixels tell its noise to a tenth; weights that scatter so much would promise too much.
     covariance *= (OWN_NOISE * noise + (1.0 - OWN_NOISE) * np.median(noise[good]))[:, None, None]
     blur, contrast = np.median(fitted[good, BLUR]), 2.0 * np.median(np.abs(fitted[good, CONTRAST]))
-    return Corners(points, covariance, good, float(blur), float(contrast), board)
+    return Corners(points, covariance, good, float(blur), float(contrast), board), fitted
 
 
 def _sense(target: Target) -> Array:

@@ -17,57 +17,75 @@ from numba import njit
 from numpy.typing import NDArray
 
 from eposit.arrays import Array
-from pipelines.blur import REORDER, decay, signed_share
+from pipelines.blur import GAUSS, REORDER, decay, signed_share
 
 Places = NDArray[np.intp]
 # Numbers of a fit, in order: disc x, y, in radii from where it is expected, and its size as a ratio; shadow x, y from
 # the foot and the softness of its rim, in radii; then k, w, gx, gy (per radius), A, L in grey values.
 SHAPE, LINEAR = 6, 6
 SIZE, SOFTNESS, CONTRAST_FROM, CONTRAST_TO = 2, 5, 7, 6
-STEPS_BACK = np.array([1e-3, 1e-3, 1e-3, 1e-2, 1e-2, 3e-3])  # for differences
 FURTHEST_STEP = np.array([0.15, 0.15, 0.02, 0.15, 0.15, 0.05])  # in one iteration
 FURTHEST_SHADOW, SOFTNESS_LIMITS = 1.2, (0.01, 0.6)
 ROUNDING = 1.0 / 12.0  # variance of a grey value that was rounded: no picture is better known
 
 
 @njit(cache=True, fastmath=REORDER, error_model="numpy")
-def _open_share(v: Array, p: Array, per_px: Array, finer: int, out: Array) -> None:
-    """Share of each fine cell that the disc leaves open. v: (2, h, w) places on its plane, radii from its centre."""
+def _open_share(v: Array, p: Array, per_px: Array, finer: int, out: Array, slopes: Array) -> None:
+    """Share of each fine cell that the disc leaves open, and its change with the disc's x, y and size (3, h, w).
+
+    v: (2, h, w) places on its plane, radii from its centre.
+    """
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
             a, b = v[0, i, j] - p[0], v[1, i, j] - p[1]
             radius = math.sqrt(a * a + b * b) + 1e-12
             across = (per_px[0, 0] * a + per_px[1, 0] * b) / radius
             down = (per_px[0, 1] * a + per_px[1, 1] * b) / radius
-            beyond = (radius - p[2]) / math.sqrt(across * across + down * down) * finer  # fine cells beyond the rim
+            per_radius = finer / math.sqrt(across * across + down * down)  # fine cells
+            beyond = (radius - p[2]) * per_radius
             out[i, j] = min(max(0.5 + beyond, 0.0), 1.0)
+            slope = -per_radius if abs(beyond) < 0.5 else 0.0
+            slopes[0, i, j], slopes[1, i, j], slopes[2, i, j] = slope * a / radius, slope * b / radius, slope
 
 
 @njit(cache=True, fastmath=REORDER, error_model="numpy")
-def _shadow(u: Array, p: Array, out: Array) -> None:
-    """Share of the lamp that is hidden. u: (2, h, w) places on the board, radii from the disc's foot."""
+def _shadow(u: Array, p: Array, out: Array, slopes: Array) -> None:
+    """Share of the lamp that is hidden, and its change with the shadow's x, y and softness (3, h, w).
+
+    u: (2, h, w) places on the board, radii from the disc's foot.
+    """
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
             a, b = u[0, i, j] - p[3], u[1, i, j] - p[4]
-            beyond = (math.sqrt(a * a + b * b) - 1.0) / p[5]
-            out[i, j] = 0.5 - 0.5 * signed_share(beyond, decay(0.5 * beyond * beyond))
+            radius = math.sqrt(a * a + b * b) + 1e-12
+            beyond = (radius - 1.0) / p[5]
+            bell = decay(0.5 * beyond * beyond)
+            out[i, j] = 0.5 - 0.5 * signed_share(beyond, bell)
+            slope = 0.5 * GAUSS * bell / p[5]
+            slopes[0, i, j], slopes[1, i, j], slopes[2, i, j] = slope * a / radius, slope * b / radius, slope * beyond
 
 
 @njit(cache=True, fastmath=REORDER)
 def _blurred(fine: Array, kernel: Array, finer: int, rows: Places, columns: Places, held: Array, out: Array) -> None:
-    """Separable blur of a fine grid, sampled at the pixels (n,), (n,) of the patch into `out` (n,)."""
-    taps, height, width = len(kernel), held.shape[0], fine.shape[1]
+    """Separable blur of a fine grid, sampled at the pixels (n,), (n,) of the patch into `out` (n,).
+
+    held: (pixels along y, width of the grid and twice as many cells as the kernel has taps).
+    """
+    taps, width = len(kernel), fine.shape[1]
     first = (finer - taps) // 2
-    for i in range(height):
-        held[i, :] = 0.0
+    for i in range(held.shape[0]):
+        line = held[i, taps : taps + width]
+        line[:] = 0.0
         for k in range(taps):
-            row = min(max(finer * i + first + k, 0), fine.shape[0] - 1)
+            cells = fine[min(max(finer * i + first + k, 0), fine.shape[0] - 1)]
             for j in range(width):
-                held[i, j] += kernel[k] * fine[row, j]
+                line[j] += kernel[k] * cells[j]
+        held[i, :taps], held[i, taps + width :] = line[0], line[-1]  # the grid goes on as it ends
     for n in range(len(out)):
-        begin, total = finer * columns[n] + first, 0.0
+        begin, total = finer * columns[n] + first + taps, 0.0
+        cells = held[rows[n], begin : begin + taps]
         for k in range(taps):
-            total += kernel[k] * held[rows[n], min(max(begin + k, 0), width - 1)]
+            total += kernel[k] * cells[k]
         out[n] = total
 
 
@@ -100,16 +118,17 @@ def fit_disc(
         (12,) the fit, (12, 12) covariance, standard deviation of the residuals where they tell the place, convergence.
     """
     total, n, fine = SHAPE + LINEAR, len(grey), fields.shape[1:]
-    opened, shade, other, product = np.empty(fine), np.empty(fine), np.empty(fine), np.empty(fine)
-    under, held, column = np.empty(fine), np.empty((fine[0] // finer, fine[1])), np.empty(n)
+    opened, shade, under, product = np.empty(fine), np.empty(fine), np.empty(fine), np.empty(fine)
+    rim, edge = np.empty((3, *fine)), np.empty((3, *fine))  # changes of the disc and of its shadow
+    held, column = np.empty((fine[0] // finer, fine[1] + 2 * len(kernel))), np.empty(n)
     basis, jacobian = np.empty((n, LINEAR)), np.empty((n, total))
     p, trial = np.zeros(total), np.zeros(total)
     trial[:SHAPE] = start
     normal, right = np.eye(total), np.zeros(total)
     cost, damping, noise, converged = -1.0, 1e-3, 4.0, False
     for _ in range(steps):
-        _open_share(v, trial, per_px, finer, opened)
-        _shadow(u, trial, shade)
+        _open_share(v, trial, per_px, finer, opened, rim)
+        _shadow(u, trial, shade, edge)
         _blurred(opened, kernel, finer, rows, columns, held, column)
         basis[:, 0], basis[:, 1] = 1.0 - column, column
         for k in range(4):
@@ -134,16 +153,9 @@ def fit_disc(
             damping = max(0.1 * damping, 1e-9)
             under[:] = p[7] - p[6] + p[8] * fields[0] + p[9] * fields[1] - p[10] * fields[2] - p[11] * shade
             for k in range(SHAPE):
-                trial[:] = p
-                trial[k] += STEPS_BACK[k]
-                if k < 3:
-                    _open_share(v, trial, per_px, finer, other)
-                    product[:] = (other - opened) * under
-                else:
-                    _shadow(u, trial, other)
-                    product[:] = (shade - other) * opened * p[11]
+                product[:] = rim[k] * under if k < 3 else edge[k - 3] * opened * -p[11]
                 _blurred(product, kernel, finer, rows, columns, held, column)
-                jacobian[:, k] = column / STEPS_BACK[k]
+                jacobian[:, k] = column
             jacobian[:, SHAPE:] = basis
             told = jacobian[:, 0] ** 2 + jacobian[:, 1] ** 2
             noise = max(np.sum(told * residual**2) / max(np.sum(told), 1e-300) * n / (n - total), ROUNDING)

@@ -22,7 +22,7 @@ from eposit.arrays import Array
 PARAMETERS = 13  # rotation 3, translation 3, lens 7
 NEWTON_STEPS = 12
 TRIES = 8
-LEAST_GAIN = 1e-7  # of the cost in one step; what a view hardly tells converges slowly
+LEAST_GAIN = 1e-4  # of the cost in one step: a hundredth of a corner; a pinhole would wander for a hundred steps
 
 
 @njit(cache=True)

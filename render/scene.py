@@ -33,7 +33,7 @@ def reference_scene(target: Target, light: Light) -> Any:
     facing = 1.0 if normal @ to_board > 0.0 else -1.0
     frame = np.eye(4)
     frame[:3] = np.column_stack((edge_a, facing * edge_b, facing * np.cross(edge_a, edge_b), corners.mean(axis=0)))
-    lamp_radiance, ambient_radiance = _radiances(target, light)
+    lamp_radiance, ambient_radiance = radiances(target, light)
     return mi.load_dict(
         {
             "type": "scene",
@@ -50,7 +50,7 @@ def reference_scene(target: Target, light: Light) -> Any:
     )
 
 
-def _radiances(target: Target, light: Light) -> tuple[float, float]:
+def radiances(target: Target, light: Light) -> tuple[float, float]:
     """Radiance of the lamp and of the surrounding that give the board's white at its centre radiance 1."""
     lamp, ambient = reference_irradiance(target, light)
     lamp_radiance = (1.0 - light.ambient_share) * np.pi / target.white / lamp

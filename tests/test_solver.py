@@ -224,3 +224,13 @@ def test_lens_names_are_the_papers_five_and_kannala_brandt():
     assert LENS_NAMES == (
         "perspective", "stereographic", "equidistance", "equisolid", "orthogonal", "kannala_brandt",
     )  # fmt: skip
+
+
+@pytest.mark.parametrize("method", eposit.METHODS)
+def test_the_object_frame_need_not_start_at_m0(method):
+    camera, shift = paper_camera("equisolid"), np.array([100.0, 50.0, -70.0])
+    pixels = camera.project(np.stack([helix_pose(t).apply(PAPER_OBJECT) for t in (0.0, 90.0, 300.0)]))
+    at_m0 = eposit.solve(PAPER_OBJECT, pixels, camera, method)
+    moved = eposit.solve(PAPER_OBJECT + shift, pixels, camera, method)
+    assert list(moved.status) == ["ok"] * 3
+    np.testing.assert_allclose(moved.cam_from_obj.t + moved.cam_from_obj.R @ shift, at_m0.cam_from_obj.t, rtol=1e-9)

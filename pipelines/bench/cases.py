@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 
 from datasets.plan import Frame, plan
 from datasets.recipe import CameraSpec, Recipe
+from eposit import Camera
+from pipelines.detection import detect_points
 from render.develop import Shot, develop
-from render.master import Master, render_master
+from render.master import Image, Master, Region, lens_coverage, render_master
 
 
 def chosen_poses(recipe: Recipe, poses: int) -> list[int]:
@@ -44,6 +46,26 @@ def image_of(recipe: Recipe, frame: Frame, master: Master | None = None) -> NDAr
     light = master_of(recipe, frame) if master is None else master
     shot = Shot(recipe.target, camera, frame.cam_from_obj, frame.rate, light.region, frame.sensor_seed)
     return develop(light.full(camera), recipe.sensor, shot)
+
+
+def over_background(recipe: Recipe, camera: Camera, film: Image, region: Region) -> Master:
+    """The light of a region from another renderer's film, (height, width, 2): radiance and share of hits."""
+    x, y, width, height = region
+    behind = np.maximum(lens_coverage(camera)[y : y + height, x : x + width] - film[..., 1], 0.0)
+    return Master((film[..., 0] + recipe.light.background * behind).astype(np.float32), region, recipe.light.background)
+
+
+def corner_errors(recipe: Recipe, frame: Frame, master: Master) -> NDArray[np.float64]:
+    """(n, 2) errors, px, of the corners that our detection finds in the picture; NaN where it finds none."""
+    target = recipe.target
+    found = detect_points(image_of(recipe, frame, master), target).points_px
+    truth = frame.camera.true_camera().project(frame.cam_from_obj.apply(target.points))
+    return (found - truth)[: target.circle_index]
+
+
+def rms(errors: list[NDArray[np.float64]]) -> float:
+    """Root mean square of all that are there."""
+    return float(np.sqrt(np.nanmean(np.concatenate(errors) ** 2)))
 
 
 def scaled(recipe: Recipe, factor: float) -> Recipe:

@@ -5,16 +5,13 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterator
 
-import numpy as np
-
 from datasets.plan import Frame
 from datasets.recipe import Recipe
-from pipelines.bench.cases import chosen_frames, image_of, master_of
+from pipelines.bench.cases import chosen_frames, corner_errors, master_of, over_background, rms
 from pipelines.bench.frames import frame_of_ours, plain
 from pipelines.bench.rows import Row, compared, noted
 from pipelines.bench.timing import in_turn
-from pipelines.detection import detect_points
-from render.master import Master, lens_coverage, target_region
+from render.master import Master, target_region
 
 PART = "equal error"
 SAMPLES = (64, 128, 256, 512, 1024, 2048)
@@ -28,11 +25,11 @@ def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
     same pixels. Where 2048 samples do not suffice, they are timed: the ratio is then a lower bound.
     """
     frames = chosen_frames(recipe, POSES)[recipe.cameras[-1].name]
-    ours = _rms([_errors(recipe, frame, master_of(recipe, frame)) for frame in frames])
+    ours = rms([corner_errors(recipe, frame, master_of(recipe, frame)) for frame in frames])
     yield noted(PART, f"{frames[0].camera.name}: corners, ours", f"{ours:.4f} px RMS")
     needed = SAMPLES[-1]
     for samples in SAMPLES:
-        theirs = _rms([_errors(recipe, frame, _plain_master(recipe, frame, samples)) for frame in frames])
+        theirs = rms([corner_errors(recipe, frame, _plain_master(recipe, frame, samples)) for frame in frames])
         yield noted(PART, f"corners, plain script, {samples} samples", f"{theirs:.4f} px RMS")
         if theirs <= ours:
             needed = samples
@@ -46,19 +43,4 @@ def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
 def _plain_master(recipe: Recipe, frame: Frame, samples: int) -> Master:
     camera = frame.camera.true_camera()
     region = target_region(recipe.target, camera, frame.cam_from_obj)
-    film = plain(recipe, frame, samples, region)
-    x, y, width, height = region
-    behind = np.maximum(lens_coverage(camera)[y : y + height, x : x + width] - film[..., 1], 0.0)
-    return Master((film[..., 0] + recipe.light.background * behind).astype(np.float32), region, recipe.light.background)
-
-
-def _errors(recipe: Recipe, frame: Frame, master: Master) -> np.ndarray:
-    """(n, 2) corner errors with the recipe's sensor and our detection."""
-    target = recipe.target
-    found = detect_points(image_of(recipe, frame, master), target).points_px
-    truth = frame.camera.true_camera().project(frame.cam_from_obj.apply(target.points))
-    return (found - truth)[: target.circle_index]
-
-
-def _rms(errors: list[np.ndarray]) -> float:
-    return float(np.sqrt(np.nanmean(np.concatenate(errors) ** 2)))
+    return over_background(recipe, camera, plain(recipe, frame, samples, region), region)

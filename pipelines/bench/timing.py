@@ -22,17 +22,29 @@ class Times:
 
 
 def in_turn(*calls: Callable[[], object], repeats: int = REPEATS, warm_up: bool = True) -> list[Times]:
-    """Times of each call, made A B A B after one round that does not count."""
+    """Times of each call, made A B A B after one round that does not count.
+
+    A call that returns `Times` has timed itself.
+    """
     if warm_up:
         for call in calls:
             call()
-    measured: list[list[tuple[float, float]]] = [[] for _ in calls]
+    measured: list[list[Times]] = [[] for _ in calls]
     for _ in range(repeats):
         for call, found in zip(calls, measured, strict=True):
             wall, cpu = time.perf_counter(), time.process_time()
-            call()
-            found.append((time.perf_counter() - wall, time.process_time() - cpu))
-    return [Times(statistics.median(w for w, _ in found), min(c for _, c in found)) for found in measured]
+            own = call()
+            taken = Times(time.perf_counter() - wall, time.process_time() - cpu)
+            found.append(own if isinstance(own, Times) else taken)
+    return [Times(statistics.median(t.wall for t in found), min(t.cpu for t in found)) for found in measured]
+
+
+def mean_of(call: Callable[[], object], count: int) -> Times:
+    """Times of one of `count` calls in a row, for a call that is far shorter than what it is compared with."""
+    wall, cpu = time.perf_counter(), time.process_time()
+    for _ in range(count):
+        call()
+    return Times((time.perf_counter() - wall) / count, (time.process_time() - cpu) / count)
 
 
 def total(times: list[Times]) -> Times:

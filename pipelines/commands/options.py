@@ -23,8 +23,8 @@ Masters = Annotated[
 DetectorName = Annotated[str, typer.Option("--detector", help="edge-fit (ours), opencv-subpix or opencv-sb.")]
 OWN = "or your own as package.module:function."
 SOLVERS_HELP = (
-    "best, centred, eposit, posit, opencv-sqpnp, opencv-epnp, opencv-iterative, opencv-p3p, opencv-fisheye, "
-    f"poselib-p3p, poselib-p4pf, {OWN}"
+    "best, centred, eposit, posit, opnp, released, opencv-sqpnp, opencv-epnp, opencv-iterative, opencv-p3p, "
+    f"opencv-fisheye, poselib-p3p, poselib-p4pf, {OWN}"
 )
 SolverName = Annotated[str | None, typer.Option("--solver", help=f"{SOLVERS_HELP}  [default: best]")]
 MoreSolvers = Annotated[
@@ -54,7 +54,8 @@ Poses = Annotated[int, typer.Option(min=1, help="Poses measured with each camera
 Only = Annotated[
     list[str] | None,
     typer.Option(
-        help="A part: render, stages, profile, frame, equal, detection, solver or growth; may be given again."
+        help="A part: render, stages, profile, frame, equal, detection, solver, growth, or blender, which `make "
+        "bench-blender` sets up; may be given again."
     ),
 ]
 Memory = Annotated[

@@ -1,0 +1,69 @@
+"""Bootstrap intervals of medians, percentiles, means and rates: every score says how well it is known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from eposit.arrays import Array
+
+RESAMPLES = 1000
+LEVEL = 0.95
+CHUNK_VALUES = 4_000_000  # resampled values held at once
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """A score and its 95 % bootstrap interval."""
+
+    value: float
+    low: float
+    high: float
+
+    def text(self, digits: int = 3, unit: str = "") -> str:
+        """`1.23 [1.2, 1.27]`, to significant digits."""
+        shown = f"{self.value:.{digits}g} [{self.low:.{digits}g}, {self.high:.{digits}g}]"
+        return f"{shown} {unit}".rstrip()
+
+
+def bootstrap(
+    values: Array, statistic: Callable[[Array], Array], seed: int = 0, resamples: int = RESAMPLES
+) -> Interval:
+    """Percentile bootstrap over the first axis of `values`, which are independent units: frames, or seeds.
+
+    values: (n,) or (n, k), k values of one unit, which stay together; NaN values take no part. statistic: from (r, m)
+    values, some NaN, to (r,), such as `median`.
+
+    Returns:
+        NaN throughout where there is nothing to resample.
+    Source:
+        Efron and Tibshirani 1993, An Introduction to the Bootstrap, section 13.3.
+    """
+    units = np.asarray(values, np.float64).reshape(len(values), -1)
+    if not len(units) or np.all(np.isnan(units)):
+        return Interval(np.nan, np.nan, np.nan)
+    value = float(statistic(units.reshape(1, -1))[0])
+    rng, found = np.random.default_rng(seed), list[Array]()
+    chunk = max(1, CHUNK_VALUES // units.size)
+    for begin in range(0, resamples, chunk):
+        drawn = rng.integers(len(units), size=(min(chunk, resamples - begin), len(units)))
+        found.append(statistic(units[drawn].reshape(len(drawn), -1)))
+    low, high = np.nanquantile(np.concatenate(found), [(1.0 - LEVEL) / 2.0, (1.0 + LEVEL) / 2.0])
+    return Interval(value, float(low), float(high))
+
+
+def median(values: Array) -> Array:
+    """(r, m) to (r,), NaN left out."""
+    return np.nanmedian(values, axis=1)
+
+
+def percentile95(values: Array) -> Array:
+    """(r, m) to (r,), NaN left out."""
+    return np.nanpercentile(values, 95.0, axis=1)
+
+
+def mean(values: Array) -> Array:
+    """(r, m) to (r,), NaN left out: of failures as 0 and 1, a rate."""
+    return np.nanmean(values, axis=1)

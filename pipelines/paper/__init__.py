@@ -1,0 +1,1 @@
+"""The paper, reproduced claim by claim, and what goes beyond it."""
