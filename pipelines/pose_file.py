@@ -15,7 +15,7 @@ from datasets.errors import UserError
 from datasets.identity import table_digest
 from datasets.plan import shard_count
 from datasets.store import Dataset
-from eposit import Pose
+from eposit import Pose, Status
 from eposit.arrays import Array
 from pipelines import score
 from pipelines.estimate import path_of_shard
@@ -71,7 +71,7 @@ def _check_name(name: str) -> None:
 
 
 def read_poses(path: Path) -> dict[int, Answer]:
-    """frame_id to pose. A row whose pose is empty or NaN as a whole is a failure, no_solution.
+    """frame_id to pose. A row is a failure if its `status` says another thing than ok, or its whole pose is empty.
 
     Raises:
         UserError: what is wrong with the file, its columns or its first wrong row.
@@ -83,7 +83,11 @@ def read_poses(path: Path) -> dict[int, Answer]:
     frames = _frames(path, numbers[FRAME])
     R = np.stack([numbers[name] for name in rotation], axis=1)
     t = np.stack([numbers[name] for name in position], axis=1)
-    return {frame: _pose(path, frame, R[i], t[i]) for i, frame in enumerate(frames)}
+    told = [str(status or "").strip() or Status.OK for status in columns.get("status", [None] * len(frames))]
+    return {
+        frame: _pose(path, frame, R[i], t[i]) if status.lower() == Status.OK else Answer(status)
+        for i, (frame, status) in enumerate(zip(frames, told, strict=True))
+    }
 
 
 def _columns(path: Path) -> dict[str, list[Any]]:

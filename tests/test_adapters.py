@@ -6,14 +6,17 @@ import sys
 import numpy as np
 import pytest
 
+import eposit.released
 from datasets.errors import UserError
 from eposit.pose import rotation_error_rad
 from pipelines.commands import options
 from pipelines.solvers.names import SOLVERS, check_solver, find_solver, solver_names, takes_four, takes_theta_centre
+from pipelines.stages import settings_of
 from tests.cameras import ALL_CAMERAS, PAPER_OBJECT, PAST_90, helix_pose, paper_camera, random_object, random_pose
 
 SIX_POINTS = ("opencv-sqpnp", "opencv-epnp", "opencv-iterative")
 FOUR_POINTS = ("opencv-p3p", "poselib-p3p", "poselib-p4pf")
+ADAPTERS = [name for name in SOLVERS if name.startswith(("opencv", "poselib"))]
 FISHEYE = ("equidistance", "kannala_brandt")
 
 
@@ -86,7 +89,7 @@ def test_a_focal_length_that_is_wrong_does_not_matter_to_p4pf():
     assert rotation_error_rad(find_solver("poselib-p3p")(PAPER_OBJECT, pixels, wrong).cam_from_obj.R, pose.R) > 1e-3
 
 
-@pytest.mark.parametrize("name", SOLVERS)
+@pytest.mark.parametrize("name", ADAPTERS)
 def test_a_batch_is_single_calls(name):
     camera, solver = paper_camera("equidistance"), find_solver(name)
     n = 4 if takes_four(name) else 7
@@ -151,7 +154,7 @@ def test_a_lens_that_opencv_has_no_model_of_is_a_status(lens):
     assert found.status == "lens_not_taken"
 
 
-@pytest.mark.parametrize("name", SOLVERS)
+@pytest.mark.parametrize("name", ADAPTERS)
 def test_wrong_shapes_are_sentences(name):
     camera = paper_camera("perspective")
     with pytest.raises(ValueError, match="points_in_obj has shape"):
@@ -163,13 +166,25 @@ def test_wrong_shapes_are_sentences(name):
 def test_names():
     assert solver_names()[:4] == ("best", "centred", "eposit", "posit")
     assert [name for name in solver_names() if takes_four(name)] == list(FOUR_POINTS)
-    assert [name for name in solver_names() if takes_theta_centre(name)] == ["eposit"]
+    assert [name for name in solver_names() if takes_theta_centre(name)] == ["eposit", "released"]
     for name in solver_names():
         check_solver(name, "four")
+    assert {setting.use for setting in settings_of(["opencv-p3p"])} == {"four"}
+    assert {setting.use for setting in settings_of(["opencv-epnp"])} == {"all"}
     with pytest.raises(UserError, match="poselib-p3p takes exactly four points; add --use four"):
         check_solver("poselib-p3p", "all")
     with pytest.raises(UserError, match=r"unknown solver 'upnp'; choose one of best, .* package\.module:function"):
         find_solver("upnp")
+
+
+def test_the_compared_solvers_are_found_by_name():
+    camera, pose = paper_camera("orthogonal"), helix_pose(20.0)
+    pixels = camera.project(pose.apply(PAPER_OBJECT))
+    found = find_solver("opnp")(PAPER_OBJECT, pixels, camera, sigma_px=0.4)
+    assert rotation_error_rad(found.cam_from_obj.R, pose.R) < 1e-9
+    released = find_solver("released")(PAPER_OBJECT, pixels[None], camera, sigma_px=0.4, theta_centre=(800.0, 600.0))
+    direct = eposit.released.solve(PAPER_OBJECT, pixels[None], camera, theta_centre=(800.0, 600.0))
+    np.testing.assert_array_equal(released.cam_from_obj.t, direct.cam_from_obj.t)
 
 
 def test_the_help_names_every_solver():

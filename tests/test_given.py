@@ -10,6 +10,7 @@ import pytest
 
 import eposit
 from datasets.errors import UserError
+from pipelines.commands import stages as commands
 from pipelines.solvers.given import attempt, file_name, load_function
 from pipelines.solvers.names import find_solver
 from tests.cameras import PAPER_OBJECT, helix_pose, paper_camera
@@ -47,9 +48,10 @@ def outcome(result):
 
 
 @pytest.mark.parametrize(("workers", "command"), [(1, "estimate"), (2, "estimate"), (1, "run")])
-def test_a_wrapper_of_our_solver_gets_our_rows(workers, command, own, root, cli, tmp_path):
+def test_a_wrapper_of_our_solver_gets_our_rows(workers, command, own, root, cli, monkeypatch):
     name = f"{own(OURS)}:solve"
     if command == "run":
+        monkeypatch.setattr(commands, "report", lambda out: None)  # its figures take time
         done = cli("run", root / "recipe.toml", "--out", root, "--solver", name)
     else:
         done = cli("estimate", root, "--solver", name, "--workers", workers)
@@ -146,6 +148,7 @@ def test_a_pose_that_is_none_is_an_error_of_the_row(R, t, words):
         (SimpleNamespace(R=np.eye(3), t=np.zeros(3)), "without status"),
         ((np.eye(3), np.zeros(3), 0), "gave the status 0; it must be a text"),
         ((np.eye(3), np.zeros(3), ""), "gave the status ''"),
+        ((np.eye(3), np.zeros(3), "OK"), "gave the status 'OK'; it must be a text, \"ok\" or the reason"),
         ((np.zeros((3, 1)), np.zeros(3)), r"R of shape \(3, 1\); .* cv2.Rodrigues"),
         ((np.eye(4), np.zeros(3)), r"gave R of shape \(4, 4\); it must be of shape \(3, 3\)"),
         ((np.eye(3), np.zeros(4)), r"gave t of shape \(4,\)"),

@@ -54,7 +54,13 @@ def test_a_new_dataset_in_a_read_only_folder(public, cli):
 
 
 @pytest.mark.parametrize(
-    ("words", "without"), [(("estimate", "--solver", "posit"), ()), (("score",), ("scores",)), (("report",), ())]
+    ("words", "without"),
+    [
+        (("estimate", "--solver", "posit"), ()),
+        (("estimate", "--again"), ()),
+        (("score",), ("scores",)),
+        (("report",), ()),
+    ],
 )
 def test_a_stage_on_a_read_only_dataset(words, without, public, cli):
     root = public.dataset(without)

@@ -12,6 +12,7 @@ CASES = {
     "unknown recipe": (lambda place: ("run", "dmo", "--out", place.new()), "did you mean demo?"),
     "describe an unknown recipe": (lambda place: ("describe", "smokey"), "did you mean smoke?"),
     "unknown solver": (estimate("--solver", "upnp"), "unknown solver 'upnp'; choose one of best"),
+    "four points for all": (estimate("--solver", "poselib-p3p"), "solver poselib-p3p takes exactly four points; add"),
     "unknown camera": (estimate("--camera", "wide"), "unknown camera 'wide'; choose one of exact"),
     "unknown use": (estimate("--use", "five"), "unknown use 'five'; choose one of four"),
     "unknown points": (estimate("--points", "seen"), "unknown points 'seen'; choose one of detected"),

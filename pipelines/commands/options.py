@@ -23,8 +23,8 @@ Masters = Annotated[
 DetectorName = Annotated[str, typer.Option("--detector", help="edge-fit (ours), opencv-subpix or opencv-sb.")]
 OWN = "or your own as package.module:function."
 SOLVERS_HELP = (
-    "best, centred, eposit, posit, opencv-sqpnp, opencv-epnp, opencv-iterative, opencv-p3p, opencv-fisheye, "
-    f"poselib-p3p, poselib-p4pf, {OWN}"
+    "best, centred, eposit, posit, opnp, released, opencv-sqpnp, opencv-epnp, opencv-iterative, opencv-p3p, "
+    f"opencv-fisheye, poselib-p3p, poselib-p4pf, {OWN}"
 )
 SolverName = Annotated[str | None, typer.Option("--solver", help=f"{SOLVERS_HELP}  [default: best]")]
 MoreSolvers = Annotated[
@@ -45,7 +45,7 @@ PoseFile = Annotated[
 PosesName = Annotated[str | None, typer.Option("--name", help="Name of the poses of --poses in tables and report.")]
 Again = Annotated[bool, typer.Option("--again", help="Estimate anew what is there, as your function has changed.")]
 PointsName = Annotated[str, typer.Option("--points", help="detected, truth or truth+noise.")]
-CameraName = Annotated[str, typer.Option("--camera", help="Camera the solver assumes: exact, nominal or paper.")]
+CameraName = Annotated[str, typer.Option("--camera", help="Camera that is assumed: exact, nominal or paper.")]
 Use = Annotated[str, typer.Option("--use", help="Object points: four or all.")]
 NoisePx = Annotated[float, typer.Option("--noise-px", help="Standard deviation of truth+noise, px per axis.")]
 Draws = Annotated[int, typer.Option("--draws", help="Draws of truth+noise.")]

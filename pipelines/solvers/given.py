@@ -149,7 +149,7 @@ def _read(result: Any, what: str) -> Answer:
 
 
 def _answer(R: Any, t: Any, status: Any, what: str) -> Answer:
-    if not isinstance(status, str) or not status:
+    if not isinstance(status, str) or not status or (status != Status.OK and status.strip().lower() == Status.OK):
         raise UserError(f'{what} gave the status {status!r}; it must be a text, "ok" or the reason of a failure')
     if status != Status.OK:
         return Answer(str(status))

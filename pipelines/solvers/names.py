@@ -5,9 +5,13 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
+
+from numpy.typing import ArrayLike
 
 import eposit
 from datasets.errors import UserError
+from eposit import Camera, Solution
 from pipelines.solvers.answers import Solver
 from pipelines.solvers.given import is_given, load_function, user_solver
 
@@ -18,12 +22,11 @@ class Entry:
 
     function: str  # package.module:function
     points: int | None = None  # the one number of points it takes; None: any from four
+    weighted: bool = True  # whether it takes `sigma_px`
     theta_centre: bool = False  # whether it can measure theta from another point than the principal one
 
 
 SOLVERS: dict[str, Entry] = {
-    "released": Entry("eposit.released:solve", theta_centre=True),
-    "opnp": Entry("eposit.opnp:solve"),
     "opencv-sqpnp": Entry("pipelines.solvers.with_opencv:sqpnp"),
     "opencv-epnp": Entry("pipelines.solvers.with_opencv:epnp"),
     "opencv-iterative": Entry("pipelines.solvers.with_opencv:iterative"),
@@ -31,6 +34,8 @@ SOLVERS: dict[str, Entry] = {
     "opencv-fisheye": Entry("pipelines.solvers.with_opencv:fisheye"),
     "poselib-p3p": Entry("pipelines.solvers.with_poselib:p3p", points=4),
     "poselib-p4pf": Entry("pipelines.solvers.with_poselib:p4pf", points=4),
+    "opnp": Entry("eposit.opnp:solve"),
+    "released": Entry("eposit.released:solve", weighted=False, theta_centre=True),
 }
 
 
@@ -73,6 +78,22 @@ def find_solver(name: str, tell: Callable[[str], None] = lambda _: None) -> Solv
     if name in eposit.METHODS:
         return functools.partial(eposit.solve, method=name)
     if name in SOLVERS:
-        return load_function(SOLVERS[name].function, "--solver")
+        function = load_function(SOLVERS[name].function, "--solver")
+        return function if SOLVERS[name].weighted else _unweighted(function)
     check_solver(name, "four")
     return user_solver(name, tell)
+
+
+def _unweighted(function: Callable[..., Solution]) -> Solver:
+    def solve(
+        points_in_obj: ArrayLike,
+        points_px: ArrayLike,
+        camera: Camera,
+        /,
+        *,
+        sigma_px: ArrayLike | None = None,
+        **options: Any,
+    ) -> Solution:
+        return function(points_in_obj, points_px, camera, **options)
+
+    return solve
