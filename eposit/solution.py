@@ -22,6 +22,7 @@ class Status(StrEnum):
     COPLANAR = "coplanar"  # the points lie in one plane and the method cannot take that
     NOT_CONVERGED = "not_converged"  # the iteration stopped before its step fell below the tolerance
     INCONSISTENT = "inconsistent"  # converged, but to a pose that does not reproduce the image points
+    NO_SOLUTION = "no_solution"  # the equations have no real solution with all points in front of the camera
 
 
 STATUS_TYPE = np.dtype(f"<U{max(len(status) for status in Status)}")
