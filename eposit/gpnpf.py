@@ -15,7 +15,7 @@ from eposit.pose import Pose
 from eposit.solution import Status
 
 REAL_IMAGINARY = 1e-4  # |Im s| / |s| up to which a root counts as real: rounding parts a double root by about 1e-7
-START_IMAGINARY = 0.3  # the same for a start of the least squares of five and more points
+START_IMAGINARY = 1.0  # the same for a start of the least squares of five and more points: every root
 STEPS = 15  # of Gauss-Newton at most; it needs 3 to 8
 STEP_TOL = 1e-13  # relative step at which Gauss-Newton stops: the floor of double precision
 COLLINEAR = 1e-4  # second over first spread of an object below which there is no pose
@@ -58,9 +58,10 @@ def _candidates(points_in_obj: Array, offsets: Array) -> Candidates:
     """Real solutions with F > 0 of (b, n, 2) offsets from the principal point."""
     order = _edge_first(points_in_obj)
     obj, pixels = points_in_obj[order], offsets[:, order]
-    scale = np.maximum(np.max(np.abs(pixels - pixels[:, :1]), axis=(1, 2)), 1e-300)
+    scale = np.max(np.abs(pixels - pixels[:, :1]), axis=(1, 2))
     edge = obj[1] - obj[0]
     along, reach = (obj[2:] - obj[0]) @ edge / (edge @ edge), np.sum((obj[2:] - obj[0]) ** 2, axis=1) / (edge @ edge)
+    scale = np.where(scale > 0.0, scale, 1.0)
     system = System(np.ascontiguousarray((pixels / scale[:, None, None]).transpose(2, 1, 0)), along, reach)
     roots = depth_ratios(system)
     limit = REAL_IMAGINARY if len(obj) == 4 else START_IMAGINARY

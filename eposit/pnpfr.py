@@ -17,6 +17,8 @@ from eposit.solution import Status
 
 REAL_IMAGINARY = 1e-4  # largest imaginary part of the relative depths and of k up to which a root counts as real
 STEPS = 6  # of Newton's method; it needs 2 to 4
+AXIS = 1e-4  # least distance from the principal point, relative to the farthest, before Newton's method
+ORTHOGONAL = 1e-6  # deviation from a rotation above which Newton's method has not arrived
 REPRODUCED_PX2 = 1e-6  # sum of squares above which a root is none: true ones leave rounding, below 1e-12
 ASKEW = rotation_from_vector((0.7, -1.1, 0.4))  # turns the object's axes away from those of its points, any will do
 
@@ -70,7 +72,7 @@ def _candidates(points_in_obj: Array, offsets: Array) -> Candidates:
     w = (offsets[..., 0] + 1j * offsets[..., 1]).T
     scale = np.max(np.abs(w), axis=0)
     w = w / np.where(scale > 0.0, scale, 1.0)
-    roots = solve_roots(obj, np.where(np.abs(w) < 1e-9, 1e-9, w))  # on the principal point a ray has no azimuth
+    roots = solve_roots(obj, np.where(np.abs(w) < AXIS, AXIS, w))  # on the principal point a ray has no azimuth
     with np.errstate(all="ignore"):
         largest = np.argmax(np.abs(roots.depths), axis=0)
         depths = roots.depths / np.take_along_axis(roots.depths, largest[None], axis=0)
@@ -117,7 +119,7 @@ def _newton(dual: Array, w: Complex, depths: Array, k: Array) -> tuple[Array, Ar
 
 
 def _poses(dual: Array, w: Complex, depths: Array, k: Array) -> tuple[Pose, Array, Mask]:
-    """Poses of an object whose first point is the origin, focal lengths (m,), and a mask of those that are finite.
+    """Poses of an object whose first point is the origin, focal lengths (m,), and a mask of those that are solutions.
 
     The sign of the camera matrix follows from the handedness of its rows; with it f is positive.
     """
@@ -131,7 +133,8 @@ def _poses(dual: Array, w: Complex, depths: Array, k: Array) -> tuple[Pose, Arra
         R = np.stack((i, j, np.cross(i, j)), axis=1)
         first = np.stack((w[:, 0].real / f, w[:, 0].imag / f, 1.0 + k * np.abs(w[:, 0]) ** 2), axis=-1)
         t = first * (sign[:, 0] * depths[:, 0] / size3)[:, None]
-    sound = np.all(np.isfinite(t), axis=1) & np.all(np.isfinite(R), axis=(1, 2)) & (sign[:, 0] != 0.0) & (f > 0.0)
+        skew = np.max(np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)), axis=(1, 2))
+        sound = np.all(np.isfinite(t), axis=1) & (sign[:, 0] != 0.0) & (f > 0.0) & (skew < ORTHOGONAL)
     return Pose(R, t), f, sound
 
 
