@@ -17,7 +17,7 @@ from eposit.solution import Status
 REAL_IMAGINARY = 1e-4  # |Im s| / |s| up to which a root counts as real: rounding parts a double root by about 1e-7
 START_IMAGINARY = 1.0  # the same for a start of the least squares of five and more points: every root
 STEPS = 15  # of Gauss-Newton at most; it needs 3 to 8
-STEP_TOL = 1e-13  # relative step at which Gauss-Newton stops: the floor of double precision
+STEP_TOL = 1e-11  # relative step at which Gauss-Newton stops, near the floor of double precision
 COLLINEAR = 1e-4  # second over first spread of an object below which there is no pose
 
 

@@ -91,9 +91,8 @@ def depth_ratios(system: System) -> NDArray[np.complex128]:
     Each coefficient is read off the circle on which it is largest against rounding.
     """
     j = np.arange(SOLUTIONS + 1)
-    read, error = zip(*(_coefficients_on(system, radius, j) for radius in RADII), strict=True)
-    best = np.argmin(np.stack(error), axis=0)
-    rising = np.take_along_axis(np.stack(read), best[None], axis=0)[0]  # (11, b)
+    read, error = _coefficients(system, j)
+    rising = np.take_along_axis(read, np.argmin(error, axis=0)[None], axis=0)[0]  # (11, b)
     with np.errstate(all="ignore"):
         size = np.abs(rising[0] / rising[-1]) ** (1.0 / SOLUTIONS)  # geometric mean of the roots
         monic = -(rising[:-1] / rising[-1]) * size ** (j[:-1, None] - SOLUTIONS)
@@ -105,9 +104,9 @@ def depth_ratios(system: System) -> NDArray[np.complex128]:
     return roots.astype(np.complex128)
 
 
-def _coefficients_on(system: System, radius: float, j: NDArray[np.int64]) -> tuple[Array, Array]:
-    """(11, b) coefficients of the resultant from its values on one circle, and their rounding error, up to a factor."""
-    s = radius * np.exp(1j * ANGLES)[:, None]
+def _coefficients(system: System, j: NDArray[np.int64]) -> tuple[Array, Array]:
+    """(3, 11, b) coefficients of the resultant from its values on each circle, and their error, up to a factor."""
+    s = np.multiply.outer(RADII, np.exp(1j * ANGLES))[..., None]  # (3, 8, 1)
     q0, q1, q2, q3 = system.coefficients(s)
     m = minors((q0 * s[..., None, :] ** 2, q1, q2, q3))  # in H, after multiplication by s^2
     middle = m[3, 0] + m[2, 1]  # the Bezout matrix of the cubics in H
@@ -120,13 +119,12 @@ def _coefficients_on(system: System, radius: float, j: NDArray[np.int64]) -> tup
     known = s * s * (1.0 - s * s) ** 2 * (ex * ex + ey * ey)
     with np.errstate(all="ignore"):
         quotient = resultant / known
-        total = np.zeros((len(j), quotient.shape[1]))
-        for angle, value in zip(
-            ANGLES, quotient, strict=True
-        ):  # in a fixed order: a batch gives the bits of single calls
+        total = np.zeros((len(RADII), len(j), quotient.shape[-1]))
+        for node, angle in enumerate(ANGLES):  # in a fixed order: a batch gives the bits of single calls
+            value = quotient[:, node, None]
             total += np.cos(j * angle)[:, None] * value.real + np.sin(j * angle)[:, None] * value.imag
-        scale = radius ** -j.astype(np.float64)[:, None]
-        error = scale * np.max(np.abs(resultant), axis=0) / np.min(np.abs(known), axis=0)
+        scale = np.array(RADII)[:, None, None] ** -j.astype(np.float64)[:, None]
+        error = scale * (np.max(np.abs(resultant), axis=1) / np.min(np.abs(known), axis=1))[:, None]
     return total * scale / len(ANGLES), np.where(np.isfinite(error), error, np.inf)
 
 
