@@ -1,0 +1,183 @@
+"""What the solvers of unknown intrinsics share: their input, the camera they estimate, and their result.
+
+Pixels become offsets from the principal point in units in which the pixel is square: x = u - cx, y = (v - cy) / aspect.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from eposit.arrays import Array, Mask
+from eposit.camera import Camera
+from eposit.pose import Pose
+from eposit.refine import whitening
+from eposit.solution import STATUS_TYPE, Solution, Status
+
+CHUNK = 1024  # problems worked on at a time
+
+
+@dataclass(frozen=True, slots=True)
+class Division:
+    """A camera with radial distortion in one parameter; k = 0 is the pinhole. One camera, or s of them: (s...) arrays.
+
+    A point at (x, y) from the principal point, r = |(x, y)|, lies on the ray (x, y, f (1 + k r^2)): k = -1 / (4 f^2) is
+    the stereographic lens, and a negative k reaches beyond 90 degrees.
+    Source:
+        Fitzgibbon 2001, "Simultaneous linear estimation of multiple view geometry and lens distortion", equation 5.
+    """
+
+    f_px: Any  # focal length along x, px; NaN where there is no estimate
+    k_per_px2: Any  # distortion, px^-2
+    cx: float  # principal point, px
+    cy: float  # principal point, px
+    aspect: float  # fy / fx
+
+    def project(self, points_in_cam: ArrayLike) -> Array:
+        """(..., 3) points, or (s..., n, 3) for s cameras, to (..., 2) px; NaN where the model has no image.
+
+        Source:
+            r Z = f R (1 + k r^2) with R = |(X, Y)|; of its two roots the one that is 0 on the axis.
+        """
+        x, y, z = np.moveaxis(np.asarray(points_in_cam, dtype=np.float64), -1, 0)
+        f, k = self._of_each_point()
+        side2 = x * x + y * y
+        with np.errstate(invalid="ignore", divide="ignore"):
+            below = z + np.sqrt(z * z - 4.0 * k * f * f * side2)
+            scale = 2.0 * f / np.where(below > 0.0, below, np.nan)
+        return np.stack((x * scale + self.cx, y * scale * self.aspect + self.cy), axis=-1)
+
+    def bearing(self, points_px: ArrayLike) -> Array:
+        """(..., 2) px, or (s..., n, 2) for s cameras, to (..., 3) unit vectors in the camera frame."""
+        pixels = np.asarray(points_px, dtype=np.float64)
+        x, y = pixels[..., 0] - self.cx, (pixels[..., 1] - self.cy) / self.aspect
+        f, k = self._of_each_point()
+        z = f * (1.0 + k * (x * x + y * y))
+        length = np.sqrt(x * x + y * y + z * z)
+        return np.stack((x / length, y / length, z / length), axis=-1)
+
+    def _of_each_point(self) -> tuple[Array, Array]:
+        f, k = np.asarray(self.f_px, dtype=np.float64), np.asarray(self.k_per_px2, dtype=np.float64)
+        return (f[..., None], k[..., None]) if f.ndim else (f, k)
+
+
+@dataclass(frozen=True, slots=True)
+class Candidates:
+    """Every real solution with f > 0 of one problem, (k,) rows, or of b problems, (b, k); NaN after the last one."""
+
+    poses: Pose  # R (..., k, 3, 3), t (..., k, 3)
+    cost: Array  # (..., k) sum of squared reprojection errors, px^2; NaN where a point is not in front of the camera
+    f_px: Array  # (..., k) focal length along x, px
+    k_per_px2: Array  # (..., k) distortion, px^-2
+    count: Any  # how many there are, () or (b,)
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate(Solution):
+    """A `Solution` with the estimated camera and all candidates. The covariance is NaN: nothing here estimates it."""
+
+    camera: Division  # the estimated one
+    candidates: Candidates
+
+    def first(self) -> Estimate:
+        """The single problem of a batch of one, without its leading axis."""
+        plain = Solution(self.status, self.cam_from_obj, self.iterations, self.reprojection_rmse_px, self.covariance)
+        one, camera, found = Solution.first(plain), self.camera, self.candidates
+        camera = Division(float(camera.f_px[0]), float(camera.k_per_px2[0]), camera.cx, camera.cy, camera.aspect)
+        poses = Pose(found.poses.R[0], found.poses.t[0])
+        candidates = Candidates(poses, found.cost[0], found.f_px[0], found.k_per_px2[0], int(found.count[0]))
+        rmse, spread = one.reprojection_rmse_px, one.covariance
+        return Estimate(one.status, one.cam_from_obj, one.iterations, rmse, spread, camera, candidates)
+
+
+@dataclass(frozen=True, slots=True)
+class Images:
+    """Validated input: b images of the same n object points."""
+
+    points_in_obj: Array  # (n, 3)
+    points_px: Array  # (b, n, 2), a harmless pattern where a row is not finite
+    finite: Mask  # (b,)
+    camera: Camera  # of which the principal point and the aspect are used
+    single: bool
+
+    @property
+    def offsets(self) -> Array:
+        """(b, n, 2) offsets from the principal point, px, y divided by the aspect."""
+        camera = self.camera
+        return (self.points_px - (camera.cx, camera.cy)) * (1.0, camera.fx / camera.fy)
+
+
+def read(points_in_obj: ArrayLike, points_px: ArrayLike, camera: Camera, sigma_px: ArrayLike | None) -> Images:
+    """The input as arrays.
+
+    Raises:
+        ValueError: wrong shapes, fewer than four points, non-finite object points, or a wrong sigma.
+    """
+    obj, pixels = np.asarray(points_in_obj, dtype=np.float64), np.asarray(points_px, dtype=np.float64)
+    if obj.ndim != 2 or obj.shape[1] != 3:
+        raise ValueError(f"points_in_obj has shape {obj.shape}; it must be (n, 3)")
+    if len(obj) < 4:
+        raise ValueError(f"points_in_obj has {len(obj)} points; a pose with unknown focal length needs at least 4")
+    if not np.all(np.isfinite(obj)):
+        raise ValueError("points_in_obj has NaN or infinite coordinates; give finite ones")
+    if pixels.ndim not in (2, 3) or pixels.shape[-2:] != (len(obj), 2):
+        raise ValueError(f"points_px has shape {pixels.shape}; it must be ({len(obj)}, 2) or (b, {len(obj)}, 2)")
+    whitening(None if sigma_px is None else np.asarray(sigma_px, dtype=np.float64), len(obj))
+    single = pixels.ndim == 2
+    pixels = pixels[None] if single else pixels
+    finite = np.all(np.isfinite(pixels), axis=(1, 2))
+    pattern = np.stack((np.arange(len(obj)) + 1.0, np.arange(len(obj)) ** 2.0), axis=-1)
+    return Images(obj, np.where(finite[:, None, None], pixels, pattern), finite, camera, single)
+
+
+def in_chunks(images: Images, candidates_of: Callable[[Array], Candidates]) -> Candidates:
+    """Candidates of all images, worked out in pieces whose arrays stay in the cache."""
+    offsets = images.offsets
+    parts = [candidates_of(offsets[i : i + CHUNK]) for i in range(0, max(1, len(offsets)), CHUNK)]
+    R, t = (np.concatenate([getattr(part.poses, name) for part in parts]) for name in ("R", "t"))
+    rest = (np.concatenate([getattr(part, name) for part in parts]) for name in ("cost", "f_px", "k_per_px2", "count"))
+    return Candidates(Pose(R, t), *rest)
+
+
+def table(width: int, rows: NDArray[np.int64], b: int, R: Array, t: Array, f_px: Array, k_per_px2: Array) -> Candidates:
+    """Candidates (m, ...) of the problems `rows` (m,), in rising order, spread over (b, width); no cost yet."""
+    count = np.bincount(rows, minlength=b)
+    column = np.arange(len(rows)) - np.repeat(np.cumsum(count) - count, count)
+    spread: list[Array] = []
+    for values in (R, t, f_px, k_per_px2):
+        wide = np.full((b, width, *values.shape[1:]), np.nan)
+        wide[rows, column] = values
+        spread.append(wide)
+    return Candidates(Pose(spread[0], spread[1]), np.full((b, width), np.nan), spread[2], spread[3], count)
+
+
+def misses(images: Images, found: Candidates) -> Array:
+    """(b, k) sum of squared reprojection errors, px^2; NaN where a point has no image under the estimated camera."""
+    camera = images.camera
+    estimated = Division(found.f_px, found.k_per_px2, camera.cx, camera.cy, camera.fy / camera.fx)
+    seen = found.poses.R @ images.points_in_obj.T + found.poses.t[..., None]  # (b, k, 3, n)
+    return np.sum((estimated.project(np.swapaxes(seen, -1, -2)) - images.points_px[:, None]) ** 2, axis=(-1, -2))
+
+
+def choose(images: Images, found: Candidates, rank: Array, steps: int, unusable: Status | None = None) -> Estimate:
+    """The candidate of lowest finite rank (b, k) of each image, the earlier of equals; NaN pose where there is none."""
+    b = np.arange(len(rank))
+    order = np.where(np.isfinite(rank), rank, np.inf)
+    best = np.argmin(order, axis=1)
+    status = np.where(np.isfinite(order[b, best]), Status.OK, Status.NO_SOLUTION).astype(STATUS_TYPE)
+    if unusable is not None:
+        status[:] = unusable
+    status[~images.finite] = Status.NON_FINITE
+    ok = status == Status.OK
+    R, t = np.where(ok[:, None, None], found.poses.R[b, best], np.nan), found.poses.t[b, best]
+    f, k = np.where(ok, found.f_px[b, best], np.nan), np.where(ok, found.k_per_px2[b, best], np.nan)
+    rmse = np.where(ok, np.sqrt(found.cost[b, best] / len(images.points_in_obj)), np.nan)
+    camera = images.camera
+    estimated = Division(f, k, camera.cx, camera.cy, camera.fy / camera.fx)
+    pose, spread = Pose(R, np.where(ok[:, None], t, np.nan)), np.full((len(b), 6, 6), np.nan)
+    estimate = Estimate(status, pose, np.where(ok, steps, 0), rmse, spread, estimated, found)
+    return estimate.first() if images.single else estimate
