@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from eposit.arrays import Array, Mask
 from eposit.camera import Camera
 from eposit.gpnpf_roots import SOLUTIONS, System, depth_ratios, squared_focal
-from eposit.minimal import Candidates, Estimate, choose, in_chunks, misses, read, table
+from eposit.minimal import CameraCandidates, Estimate, choose, in_chunks, misses, read, table
 from eposit.pose import Pose
 from eposit.solution import Status
 
@@ -50,11 +50,11 @@ def solve(
     with np.errstate(invalid="ignore"):
         in_front = np.all(found.poses.apply(images.points_in_obj)[..., 2] > 0.0, axis=-1)
     cost = np.where(in_front, misses(images, found), np.nan)
-    found = Candidates(found.poses, cost, found.f_px, found.k_per_px2, found.count)
+    found = CameraCandidates(found.poses, cost, found.f_px, found.k_per_px2, found.count)
     return choose(images, found, cost, STEPS, unusable)
 
 
-def _candidates(points_in_obj: Array, offsets: Array) -> Candidates:
+def _candidates(points_in_obj: Array, offsets: Array) -> CameraCandidates:
     """Real solutions with F > 0 of (b, n, 2) offsets from the principal point."""
     order = _edge_first(points_in_obj)
     obj, pixels = points_in_obj[order], offsets[:, order]

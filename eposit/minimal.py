@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from eposit.arrays import Array, Mask
 from eposit.camera import Camera
 from eposit.pose import Pose
-from eposit.refine import whitening
+from eposit.problem import validate
 from eposit.solution import STATUS_TYPE, Solution, Status
 
 CHUNK = 1024  # problems worked on at a time
@@ -66,7 +66,7 @@ class Division:
 
 
 @dataclass(frozen=True, slots=True)
-class Candidates:
+class CameraCandidates:
     """Every real solution with f > 0 of one problem, (k,) rows, or of b problems, (b, k); NaN after the last one."""
 
     poses: Pose  # R (..., k, 3, 3), t (..., k, 3)
@@ -81,7 +81,7 @@ class Estimate(Solution):
     """A `Solution` with the estimated camera and all candidates. The covariance is NaN: nothing here estimates it."""
 
     camera: Division  # the estimated one
-    candidates: Candidates
+    candidates: CameraCandidates
 
     def first(self) -> Estimate:
         """The single problem of a batch of one, without its leading axis."""
@@ -89,7 +89,7 @@ class Estimate(Solution):
         one, camera, found = Solution.first(plain), self.camera, self.candidates
         camera = Division(float(camera.f_px[0]), float(camera.k_per_px2[0]), camera.cx, camera.cy, camera.aspect)
         poses = Pose(found.poses.R[0], found.poses.t[0])
-        candidates = Candidates(poses, found.cost[0], found.f_px[0], found.k_per_px2[0], int(found.count[0]))
+        candidates = CameraCandidates(poses, found.cost[0], found.f_px[0], found.k_per_px2[0], int(found.count[0]))
         rmse, spread = one.reprojection_rmse_px, one.covariance
         return Estimate(one.status, one.cam_from_obj, one.iterations, rmse, spread, camera, candidates)
 
@@ -117,34 +117,26 @@ def read(points_in_obj: ArrayLike, points_px: ArrayLike, camera: Camera, sigma_p
     Raises:
         ValueError: wrong shapes, fewer than four points, non-finite object points, or a wrong sigma.
     """
-    obj, pixels = np.asarray(points_in_obj, dtype=np.float64), np.asarray(points_px, dtype=np.float64)
-    if obj.ndim != 2 or obj.shape[1] != 3:
-        raise ValueError(f"points_in_obj has shape {obj.shape}; it must be (n, 3)")
-    if len(obj) < 4:
-        raise ValueError(f"points_in_obj has {len(obj)} points; a pose with unknown focal length needs at least 4")
-    if not np.all(np.isfinite(obj)):
-        raise ValueError("points_in_obj has NaN or infinite coordinates; give finite ones")
-    if pixels.ndim not in (2, 3) or pixels.shape[-2:] != (len(obj), 2):
-        raise ValueError(f"points_px has shape {pixels.shape}; it must be ({len(obj)}, 2) or (b, {len(obj)}, 2)")
-    whitening(None if sigma_px is None else np.asarray(sigma_px, dtype=np.float64), len(obj))
-    single = pixels.ndim == 2
-    pixels = pixels[None] if single else pixels
-    finite = np.all(np.isfinite(pixels), axis=(1, 2))
-    pattern = np.stack((np.arange(len(obj)) + 1.0, np.arange(len(obj)) ** 2.0), axis=-1)
-    return Images(obj, np.where(finite[:, None, None], pixels, pattern), finite, camera, single)
+    problem, single = validate(points_in_obj, points_px, camera, sigma_px)
+    finite, count = problem.status == Status.OK, len(problem.points_in_obj)
+    pattern = np.stack((np.arange(count) + 1.0, np.arange(count) ** 2.0), axis=-1)
+    pixels = np.where(finite[:, None, None], problem.points_px, pattern)
+    return Images(problem.points_in_obj, pixels, finite, camera, single)
 
 
-def in_chunks(images: Images, candidates_of: Callable[[Array], Candidates]) -> Candidates:
-    """Candidates of all images, worked out in pieces whose arrays stay in the cache."""
+def in_chunks(images: Images, candidates_of: Callable[[Array], CameraCandidates]) -> CameraCandidates:
+    """CameraCandidates of all images, worked out in pieces whose arrays stay in the cache."""
     offsets = images.offsets
     parts = [candidates_of(offsets[i : i + CHUNK]) for i in range(0, max(1, len(offsets)), CHUNK)]
     R, t = (np.concatenate([getattr(part.poses, name) for part in parts]) for name in ("R", "t"))
     rest = (np.concatenate([getattr(part, name) for part in parts]) for name in ("cost", "f_px", "k_per_px2", "count"))
-    return Candidates(Pose(R, t), *rest)
+    return CameraCandidates(Pose(R, t), *rest)
 
 
-def table(width: int, rows: NDArray[np.int64], b: int, R: Array, t: Array, f_px: Array, k_per_px2: Array) -> Candidates:
-    """Candidates (m, ...) of the problems `rows` (m,), in rising order, spread over (b, width); no cost yet."""
+def table(
+    width: int, rows: NDArray[np.int64], b: int, R: Array, t: Array, f_px: Array, k_per_px2: Array
+) -> CameraCandidates:
+    """CameraCandidates (m, ...) of the problems `rows` (m,), in rising order, spread over (b, width); no cost yet."""
     count = np.bincount(rows, minlength=b)
     column = np.arange(len(rows)) - np.repeat(np.cumsum(count) - count, count)
     spread: list[Array] = []
@@ -152,10 +144,10 @@ def table(width: int, rows: NDArray[np.int64], b: int, R: Array, t: Array, f_px:
         wide = np.full((b, width, *values.shape[1:]), np.nan)
         wide[rows, column] = values
         spread.append(wide)
-    return Candidates(Pose(spread[0], spread[1]), np.full((b, width), np.nan), spread[2], spread[3], count)
+    return CameraCandidates(Pose(spread[0], spread[1]), np.full((b, width), np.nan), spread[2], spread[3], count)
 
 
-def misses(images: Images, found: Candidates) -> Array:
+def misses(images: Images, found: CameraCandidates) -> Array:
     """(b, k) sum of squared reprojection errors, px^2; NaN where a point has no image under the estimated camera."""
     camera = images.camera
     estimated = Division(found.f_px, found.k_per_px2, camera.cx, camera.cy, camera.fy / camera.fx)
@@ -163,7 +155,9 @@ def misses(images: Images, found: Candidates) -> Array:
     return np.sum((estimated.project(np.swapaxes(seen, -1, -2)) - images.points_px[:, None]) ** 2, axis=(-1, -2))
 
 
-def choose(images: Images, found: Candidates, rank: Array, steps: int, unusable: Status | None = None) -> Estimate:
+def choose(
+    images: Images, found: CameraCandidates, rank: Array, steps: int, unusable: Status | None = None
+) -> Estimate:
     """The candidate of lowest finite rank (b, k) of each image, the earlier of equals; NaN pose where there is none."""
     b = np.arange(len(rank))
     order = np.where(np.isfinite(rank), rank, np.inf)

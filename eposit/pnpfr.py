@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from eposit.arrays import Array, Mask
 from eposit.camera import Camera
-from eposit.minimal import Candidates, Estimate, choose, in_chunks, misses, read, table
+from eposit.minimal import CameraCandidates, Estimate, choose, in_chunks, misses, read, table
 from eposit.pnpfr_roots import SOLUTIONS, Complex, dual_basis, solve_roots
 from eposit.pose import Pose, rotation_from_vector
 from eposit.posit import COPLANAR_CONDITION, condition
@@ -56,16 +56,16 @@ def solve(
     cost = misses(images, found)
     with np.errstate(invalid="ignore"):
         cost = np.where(cost < REPRODUCED_PX2, cost, np.nan)
-    found = Candidates(found.poses, cost, found.f_px, found.k_per_px2, found.count)
+    found = CameraCandidates(found.poses, cost, found.f_px, found.k_per_px2, found.count)
     return choose(images, found, np.where(np.isnan(cost), np.nan, np.abs(found.k_per_px2)), STEPS)
 
 
-def _nothing(offsets: Array) -> Candidates:
+def _nothing(offsets: Array) -> CameraCandidates:
     rows, none = np.zeros(0, np.int64), np.zeros((0, 3))
     return table(SOLUTIONS, rows, len(offsets), np.zeros((0, 3, 3)), none, none[:, 0], none[:, 0])
 
 
-def _candidates(points_in_obj: Array, offsets: Array) -> Candidates:
+def _candidates(points_in_obj: Array, offsets: Array) -> CameraCandidates:
     """Real solutions of (b, 4, 2) offsets from the principal point."""
     size = np.sqrt(np.mean(np.sum((points_in_obj - points_in_obj[0]) ** 2, axis=1)))
     obj = (points_in_obj - points_in_obj[0]) @ ASKEW.T / size

@@ -23,7 +23,6 @@ class Status(StrEnum):
     NOT_CONVERGED = "not_converged"  # the iteration stopped before its step fell below the tolerance
     NO_SOLUTION = "no_solution"  # no real solution of the equations has all points in front of the camera
     INCONSISTENT = "inconsistent"  # converged, but to a pose that does not reproduce the image points
-    NO_SOLUTION = "no_solution"  # the equations have no real solution with all points in front of the camera
 
 
 STATUS_TYPE = np.dtype(f"<U{max(len(status) for status in Status)}")

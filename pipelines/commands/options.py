@@ -23,8 +23,8 @@ Masters = Annotated[
 DetectorName = Annotated[str, typer.Option("--detector", help="edge-fit (ours), opencv-subpix or opencv-sb.")]
 OWN = "or your own as package.module:function."
 SOLVERS_HELP = (
-    "best, centred, eposit, posit, opnp, released, opencv-sqpnp, opencv-epnp, opencv-iterative, opencv-p3p, "
-    f"opencv-fisheye, poselib-p3p, poselib-p4pf, {OWN}"
+    "best, centred, eposit, posit, opnp, gpnpf, pnpfr, released, opencv-sqpnp, opencv-epnp, opencv-iterative, "
+    f"opencv-p3p, opencv-fisheye, poselib-p3p, poselib-p4pf, {OWN}"
 )
 SolverName = Annotated[str | None, typer.Option("--solver", help=f"{SOLVERS_HELP}  [default: best]")]
 MoreSolvers = Annotated[

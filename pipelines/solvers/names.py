@@ -35,6 +35,8 @@ SOLVERS: dict[str, Entry] = {
     "poselib-p3p": Entry("pipelines.solvers.with_poselib:p3p", points=4),
     "poselib-p4pf": Entry("pipelines.solvers.with_poselib:p4pf", points=4),
     "opnp": Entry("eposit.opnp:solve"),
+    "gpnpf": Entry("eposit.gpnpf:solve"),
+    "pnpfr": Entry("eposit.pnpfr:solve", points=4),
     "released": Entry("eposit.released:solve", weighted=False, theta_centre=True),
 }
 
