@@ -1,4 +1,4 @@
-"""Names of array types, and the one product that NumPy lacks for coordinates-first arrays."""
+"""Names of array types, and what NumPy lacks for arrays that are long in their last axis."""
 
 from typing import Any
 
@@ -11,4 +11,13 @@ Mask = NDArray[np.bool_]
 
 def cross(a: Array, b: Array) -> Array:
     """Cross product along the first axis, (3, ...) with (3, ...)."""
-    return np.stack((a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]))
+    product = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        np.multiply(a[j], b[k], out=product[i])
+        product[i] -= a[k] * b[j]
+    return product
+
+
+def pick(values: Array, rows: NDArray[np.int64]) -> Array:
+    """values[..., rows]: the same, several times faster."""
+    return np.take(values, rows, axis=-1, mode="clip")

@@ -14,12 +14,11 @@ from eposit.camera import Camera
 from eposit.candidates import Candidates, join_candidates, table
 from eposit.planar import plane_axes
 from eposit.pose import Pose
-from eposit.posit import COPLANAR_CONDITION, Start, rectify_bearings
 from eposit.problem import Problem, mark, validate
 from eposit.quartic import FIRST, SECOND, ZERO, critical_points, newton_step
-from eposit.refine import refine_poses
+from eposit.refine import Refined, covariance, normal_equations, refine_poses
 from eposit.solution import Solution, Status, join
-from eposit.solver import finish
+from eposit.starts import COPLANAR_CONDITION
 
 CHUNK = 32  # problems worked on at a time; each takes half a megabyte
 REAL = 1e-4  # relative imaginary part below which a root is tried as real; what is not does not converge
@@ -114,13 +113,36 @@ def _solve(problem: Problem, refine: bool) -> OpnpSolution:
     front = np.flatnonzero(np.all(depth > 0.0, axis=1))
     rows, first = np.unique(row[front], return_index=True)
     lowest = front[first]
-    start = Start(np.full((b, 3, 3), np.nan), np.full((b, 3), np.nan), np.zeros(b, np.int64), np.zeros(b, bool))
-    start.put(good[rows], Start(R[lowest], t[lowest], steps[lowest], np.ones(len(rows), bool)))
-    mark(status, ~start.converged, Status.NO_SOLUTION)
+    found = Refined(
+        np.full((b, 3, 3), np.nan), np.full((b, 3), np.nan), np.full(b, np.nan), np.zeros(b, int), status == ""
+    )
+    for values, chosen in ((found.R, R), (found.t, t), (found.steps, steps), (found.cost, cost)):
+        values[good[rows]] = chosen[lowest]
+    found.converged[good[rows]] = True
+    mark(status, ~found.converged, Status.NO_SOLUTION)
     if refine:
-        start = _refined(problem, start)
-        mark(status, ~start.converged, Status.NOT_CONVERGED)
-    return _extended(finish(problem, start, status), candidates, all_pairs)
+        u, v = problem.uv
+        done = refine_poses(problem.camera, problem.points_in_obj, u, v, found.R, found.t, problem.weights)
+        mark(status, ~done.converged, Status.NOT_CONVERGED)
+        found = Refined(done.R, done.t, done.cost, found.steps + done.steps, done.converged)
+    return _extended(_finished(problem, found, status), candidates, all_pairs)
+
+
+def _finished(problem: Problem, found: Refined, status: NDArray[np.str_]) -> Solution:
+    """Poses, RMSE and covariances at the poses, as `eposit.solve` states them; NaN where the status is not OK."""
+    ok, n = status == Status.OK, len(problem.points_in_obj)
+    R, t = np.where(ok[:, None, None], found.R, np.nan), np.where(ok[:, None], found.t, np.nan)
+    misses = problem.camera.project(Pose(R, t).apply(problem.points_in_obj)) - problem.points_px
+    rmse = np.sqrt(np.sum(misses**2, axis=(1, 2)) / n)
+    spread = np.full((len(ok), 6, 6), np.nan)
+    if np.any(ok):
+        u, v = problem.uv
+        normal, _ = normal_equations(
+            problem.camera, problem.points_in_obj, u[:, ok], v[:, ok], R[ok], t[ok], problem.weights
+        )
+        factor = 1.0 if problem.absolute else rmse[ok, None, None] ** 2 * n / (2 * n - 6)
+        spread[ok] = covariance(normal) * factor
+    return Solution(status, Pose(R, t), np.where(ok, found.steps, 0), rmse, spread)
 
 
 def _checked(problem: Problem) -> tuple[NDArray[np.str_], Array, Array]:
@@ -131,7 +153,8 @@ def _checked(problem: Problem) -> tuple[NDArray[np.str_], Array, Array]:
     mark(status, np.any(bearings[..., 2] <= 0.0, axis=1), Status.FIELD_ANGLE)
     _, _, spreads = plane_axes(problem.points_in_obj)
     mark(status, np.full(len(status), bool(spreads[1] <= spreads[0] / COPLANAR_CONDITION)), Status.COPLANAR)
-    u, v = rectify_bearings(bearings)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        u, v = (np.where(bearings[..., 2] > 0.0, bearings[..., k] / bearings[..., 2], np.nan).T for k in range(2))
     mark(status, (np.ptp(u, axis=0) == 0.0) & (np.ptp(v, axis=0) == 0.0), Status.NO_SOLUTION)
     return status, u, v
 
@@ -242,13 +265,6 @@ def _cost(system: _System, row: NDArray[np.int64], y: Array) -> Array:
 
 def _products(y: Array) -> Array:
     return y[..., FIRST] * y[..., SECOND]
-
-
-def _refined(problem: Problem, start: Start) -> Start:
-    """Gauss-Newton on the reprojection error."""
-    u, v = problem.uv
-    done = refine_poses(problem.camera, problem.points_in_obj, u, v, start.R, start.t, problem.weights)
-    return Start(done.R, done.t, start.iterations + done.steps, done.converged)
 
 
 def _extended(solution: Solution, candidates: Candidates, pairs: Any) -> OpnpSolution:

@@ -1,5 +1,7 @@
 """Perspective from three points on bearings: every pose of a triangle, so that no basin is missed.
 
+Arrays have the problems last: rays (n, 3, b), poses R (3, 3, b) and t (3, b).
+
 Source:
     Grunert 1841 in the form of Haralick et al. 1994 (law of cosines, one quartic); the elimination is worked out here.
 """
@@ -8,26 +10,41 @@ from __future__ import annotations
 
 import numpy as np
 
-from eposit.arrays import Array
+from eposit.arrays import Array, cross
+from eposit.roots4 import quartic_roots
 
 
-def p3p_starts(points_in_obj: Array, bearings: Array, keep: int) -> list[tuple[Array, Array]]:
+def p3p_poses(points_in_obj: Array, rays: Array, keep: int) -> list[tuple[Array, Array]]:
     """The `keep` poses of the widest triangle that fit all points best, best first; NaN where there are fewer.
 
-    points_in_obj: (n, 3). bearings: (b, n, 3) unit vectors, any direction. Each pose is (b, 3, 3) with (b, 3).
+    points_in_obj: (n, 3). rays: (n, 3, b) unit vectors, any direction.
     """
-    triangle = _widest_triangle(points_in_obj)
-    depths = _depths(points_in_obj[triangle], bearings[:, triangle])  # (b, 4, 3)
-    corners = depths[..., None] * bearings[:, None, triangle, :]  # (b, 4, 3 points, 3)
-    R = _frame(corners) @ np.swapaxes(_frame(points_in_obj[triangle]), -1, -2)
-    t = corners.mean(axis=2) - R @ points_in_obj[triangle].mean(axis=0)
-    seen = points_in_obj @ np.swapaxes(R, -1, -2) + t[..., None, :]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        seen = seen / np.linalg.norm(seen, axis=-1, keepdims=True)
-    misfit = np.sum((seen - bearings[:, None]) ** 2, axis=(2, 3))
-    order = np.argsort(np.where(np.isfinite(misfit), misfit, np.inf), axis=1)[:, :keep]
-    rows = np.arange(len(bearings))
-    return [(R[rows, column], t[rows, column]) for column in order.T]
+    triangle, b = _widest_triangle(points_in_obj), rays.shape[-1]
+    with np.errstate(all="ignore"):
+        depths = _depths(points_in_obj[triangle], rays[triangle])  # (3, 4, b)
+        corners = (depths[:, None] * rays[triangle][:, :, None]).reshape(3, 3, 4 * b)
+        frame = _frame(points_in_obj[triangle][..., None])[..., 0]
+        R = np.einsum("ikb,jk->ijb", _frame(corners), frame)
+        t = np.add.reduce(corners, axis=0) / 3.0 - np.einsum("ijb,j->ib", R, points_in_obj[triangle].mean(axis=0))
+        misfit = ray_misfit(points_in_obj, np.tile(rays, 4), R, t).reshape(4, b)
+    order = np.argsort(np.where(np.isfinite(misfit), misfit, np.inf), axis=0)[:keep]
+    turns, places = R.reshape(3, 3, 4, b), t.reshape(3, 4, b)
+    return [
+        (
+            np.take_along_axis(turns, row[None, None, None], 2)[:, :, 0],
+            np.take_along_axis(places, row[None, None], 1)[:, 0],
+        )
+        for row in order
+    ]
+
+
+def ray_misfit(points_in_obj: Array, rays: Array, R: Array, t: Array) -> Array:
+    """(b,) sums over the points of the squared distance between (n, 3, b) unit rays and the poses' rays."""
+    point = np.einsum("nj,ijb->nib", points_in_obj, R)
+    point += t
+    point /= np.sqrt(np.einsum("nib,nib->nb", point, point))[:, None]
+    point -= rays
+    return np.einsum("nib,nib->b", point, point)
 
 
 def _widest_triangle(points_in_obj: Array) -> list[int]:
@@ -40,13 +57,13 @@ def _widest_triangle(points_in_obj: Array) -> list[int]:
     return [int(first), int(second), int(np.argmax(areas))]
 
 
-def _depths(triangle: Array, bearings: Array) -> Array:
-    """(b, 4, 3) distances of the corners along their rays; NaN for roots without a pose.
+def _depths(triangle: Array, rays: Array) -> Array:
+    """(3, 4, b) distances of the corners along their (3, 3, b) rays; NaN for roots without a pose.
 
     With u = s2 / s1 and v = s3 / s1 the laws of cosines give u as a rational function of v and a quartic in v.
     """
     a2, b2, c2 = (np.sum((triangle[i] - triangle[j]) ** 2) for i, j in ((1, 2), (0, 2), (0, 1)))
-    cos_a, cos_b, cos_c = (np.sum(bearings[:, i] * bearings[:, j], axis=1) for i, j in ((1, 2), (0, 2), (0, 1)))
+    cos_a, cos_b, cos_c = (np.einsum("ib,ib->b", rays[i], rays[j]) for i, j in ((1, 2), (0, 2), (0, 1)))
     one, zero = np.ones_like(cos_a), np.zeros_like(cos_a)
     q = (one, -2.0 * cos_b, one)  # (s1^2 + s3^2 - 2 s1 s3 cos_b) / s1^2, coefficients by rising power of v
     ratio = (a2 - c2) / b2
@@ -59,24 +76,11 @@ def _depths(triangle: Array, bearings: Array) -> Array:
         tuple(-2.0 * cos_c * value for value in _multiply(numerator, denominator)),
     )
     quartic = [sum((term[power] for term in terms if power < len(term)), start=zero) for power in range(5)]
-    v = _quartic_roots(quartic)
-    with np.errstate(all="ignore"):
-        u = _evaluate(numerator, v) / _evaluate(denominator, v)
-        s1 = np.sqrt(b2 / _evaluate(q, v))
-        depths = np.stack((s1, u * s1, v * s1), axis=-1)
-        return np.where(np.all(depths > 0.0, axis=-1, keepdims=True), depths, np.nan)
-
-
-def _quartic_roots(rising: list[Array]) -> Array:
-    """(b, 4) real parts of the roots: noise turns a double root into a complex pair; its real part is a good start."""
-    lead = np.where(np.abs(rising[4]) > 1e-14 * np.max(np.abs(rising), axis=0), rising[4], np.nan)
-    companion = np.zeros((len(lead), 4, 4))
-    companion[:, [1, 2, 3], [0, 1, 2]] = 1.0
-    companion[:, :, 3] = -np.stack(rising[:4], axis=1) / lead[:, None]
-    usable = np.all(np.isfinite(companion), axis=(1, 2))
-    roots = np.full((len(lead), 4), np.nan)
-    roots[usable] = np.linalg.eigvals(companion[usable]).real
-    return roots
+    v = quartic_roots(quartic)
+    u = (numerator[0] + v * (numerator[1] + v * numerator[2])) / (denominator[0] + v * denominator[1])
+    s1 = np.sqrt(b2 / (1.0 + v * (q[1] + v)))
+    depths = np.stack((s1, u * s1, v * s1))
+    return np.where(np.all(depths > 0.0, axis=0), depths, np.nan)
 
 
 def _multiply(left: tuple[Array, ...], right: tuple[Array, ...]) -> tuple[Array, ...]:
@@ -88,19 +92,10 @@ def _multiply(left: tuple[Array, ...], right: tuple[Array, ...]) -> tuple[Array,
     return tuple(product)
 
 
-def _evaluate(rising: tuple[Array, ...], v: Array) -> Array:
-    total = np.zeros_like(v)
-    for coefficient in reversed(rising):
-        total = total * v + coefficient[:, None]
-    return total
-
-
 def _frame(corners: Array) -> Array:
-    """(..., 3, 3) orthonormal columns spanned by a triangle's (..., 3 points, 3) edges."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        along = corners[..., 1, :] - corners[..., 0, :]
-        along = along / np.linalg.norm(along, axis=-1, keepdims=True)
-        normal: Array = np.cross(along, corners[..., 2, :] - corners[..., 0, :])
-        normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
-    across: Array = np.cross(normal, along)
-    return np.stack((along, across, normal), axis=-1)
+    """(3, 3, b) rotations whose columns are spanned by the edges of (3 points, 3, b) triangles."""
+    along = corners[1] - corners[0]
+    along = along / np.sqrt(np.einsum("ib,ib->b", along, along))
+    normal = cross(along, corners[2] - corners[0])
+    normal = normal / np.sqrt(np.einsum("ib,ib->b", normal, normal))
+    return np.stack((along, cross(normal, along), normal), axis=1)

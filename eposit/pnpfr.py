@@ -12,8 +12,8 @@ from eposit.camera import Camera
 from eposit.minimal import CameraCandidates, Estimate, choose, in_chunks, misses, read, table
 from eposit.pnpfr_roots import SOLUTIONS, Complex, dual_basis, solve_roots
 from eposit.pose import Pose, rotation_from_vector
-from eposit.posit import COPLANAR_CONDITION, condition
 from eposit.solution import Status
+from eposit.starts import Shape
 
 REAL_IMAGINARY = 1e-4  # largest imaginary part of the relative depths and of k up to which a root counts as real
 STEPS = 6  # of Newton's method; it needs 2 to 4
@@ -49,7 +49,7 @@ def solve(
     images = read(points_in_obj, points_px, camera, sigma_px)
     if len(images.points_in_obj) != 4:
         raise ValueError(f"points_in_obj has {len(images.points_in_obj)} points; PnPfr takes exactly 4, choose four")
-    if condition(images.points_in_obj) > COPLANAR_CONDITION:
+    if not Shape.of(images.points_in_obj).solid:
         found = in_chunks(images, _nothing)
         return choose(images, found, found.cost, 0, Status.COPLANAR)
     found = in_chunks(images, partial(_candidates, images.points_in_obj))

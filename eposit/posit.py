@@ -2,7 +2,7 @@
 
 The three share one iteration and differ in how image points become pinhole-equivalent points (x, y at depth 1):
 POSIT takes them from the bearing, EPOSIT from the paper's G(theta), centred EPOSIT from bearings turned so that
-M0's ray is the axis. Arrays here are coordinates-first, (n, b): n points, b problems.
+M0's ray is the axis. Arrays here have the problems last: images (2, n, b), poses R (3, 3, b) and t (3, b).
 """
 
 from __future__ import annotations
@@ -12,80 +12,51 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eposit.arrays import Array, Mask, cross
-from eposit.camera import Camera
-from eposit.p3p import p3p_starts
+from eposit.arrays import Array, Mask, cross, pick
 
-CONVERGENT_TAN = np.sqrt(2.0)  # tan of the incidence angle beyond which the iteration no longer contracts
-DOUBTFUL_MISFIT = 1e-3  # misfit over spread above which a fixed point is compared with the poses of a triangle
-CONSISTENT_MISFIT = 0.1  # misfit over spread above which a fixed point is no pose
-EXACT_MISFIT = 1e-7  # misfit over spread of a triangle's pose that shows noise-free points, which EPOSIT then must fit
-COPLANAR_CONDITION = 1e4  # cond(A) from which the points count as coplanar: there double precision leaves 12 digits
+COMPRESS = 4  # finished problems leave the arrays when they are one in so many: leaving costs, and so does staying
 
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """Poses from a linear method; rows that failed are NaN."""
+    """Poses from a start or a search; rows that failed may be NaN."""
 
-    R: Array  # (b, 3, 3)
-    t: Array  # (b, 3), unit of the object points
+    R: Array  # (3, 3, b)
+    t: Array  # (3, b), unit of the object points
     iterations: NDArray[np.int64]  # (b,)
     converged: Mask  # (b,)
 
     def put(self, rows: NDArray[np.int64], other: Start) -> None:
         """Overwrite some rows with those of another result; iterations add up."""
-        self.R[rows], self.t[rows], self.converged[rows] = other.R, other.t, other.converged
+        self.R[..., rows], self.t[:, rows], self.converged[rows] = other.R, other.t, other.converged
         self.iterations[rows] += other.iterations
 
-
-def condition(points_in_obj: Array) -> float:
-    """cond(A) of the (n, 3) points' offsets from M0; infinite for coplanar or repeated points."""
-    values = np.linalg.svd(points_in_obj[1:] - points_in_obj[0], compute_uv=False)
-    return float(values[0] / values[-1]) if values[-1] > 0.0 else float("inf")
+    def take(self, rows: NDArray[np.int64]) -> Start:
+        """Some of the rows."""
+        return Start(pick(self.R, rows), pick(self.t, rows), self.iterations[rows], self.converged[rows])
 
 
-def rectify_bearings(bearings: Array) -> tuple[Array, Array]:
-    """(b, n, 3) unit vectors to pinhole points x, y, each (n, b); NaN at or beyond 90 degrees."""
-    x, y, z = np.moveaxis(bearings, -1, 0)
-    depth = np.where(z > 0.0, z, np.nan)
-    return (x / depth).T, (y / depth).T
+@dataclass(slots=True)
+class _Work:
+    """The problems still iterated on."""
 
+    rows: NDArray[np.int64]  # (a,) their numbers
+    image: Array  # (2, n - 1, a) points but M0
+    base: Array  # (2, n - 1, a) the same minus M0
+    epsilon: Array  # (n - 1, a) relative depths
+    previous: Array  # (2, 3, a) I and J of the last iteration
 
-def rectify_paper(
-    points_px: Array, camera: Camera, theta_centre: tuple[float, float] | None = None
-) -> tuple[Array, Array]:
-    """(b, n, 2) px to x' / (f G) and y' / (f G), each (n, b).
-
-    theta_centre: the point, px, that theta is measured from; the principal point if None. The paper measures
-    theta from the image centre and subtracts the principal point from x and y.
-    Source:
-        Paper, Table I and equations 21 and 22: G(theta) = cos(theta) / g(theta).
-    """
-    centre_x, centre_y = (camera.cx, camera.cy) if theta_centre is None else theta_centre
-    u, v = points_px[..., 0].T, points_px[..., 1].T
-    radius = np.hypot((u - centre_x) / camera.fx, (v - centre_y) / camera.fy)
-    theta = camera.law.theta(radius)
-    theta = np.where(theta < np.pi / 2, theta, np.nan)
-    inverse_ratio = camera.law.g(theta) / np.cos(theta)
-    return (u - camera.cx) / camera.fx * inverse_ratio, (v - camera.cy) / camera.fy * inverse_ratio
-
-
-def centring_rotations(bearings: Array) -> Array:
-    """(b, 3, 3) shortest rotations that carry M0's ray, row 0 of (b, n, 3), onto the z axis."""
-    x, y, z = np.moveaxis(bearings[:, 0], -1, 0)
-    backward = z < -0.5  # the shortest rotation is ill-conditioned near -z: first turn half a revolution about x
-    flip = np.where(backward, -1.0, 1.0)
-    y, z = flip * y, flip * z
-    w = 1.0 / (1.0 + z)
-    rows = np.stack((1.0 - x * x * w, -x * y * w, -x, -x * y * w, 1.0 - y * y * w, -y, x, y, z), axis=-1)
-    rotation = rows.reshape(-1, 3, 3)
-    return rotation * np.stack((np.ones_like(flip), flip, flip), axis=-1)[:, None, :]
+    def keep(self, kept: NDArray[np.int64]) -> None:
+        """Drop the others."""
+        self.rows = self.rows[kept]
+        self.image, self.base, self.epsilon, self.previous = (
+            pick(values, kept) for values in (self.image, self.base, self.epsilon, self.previous)
+        )
 
 
 def posit(
     points_in_obj: Array,
-    x: Array,
-    y: Array,
+    image: Array,
     tol: float,
     max_iterations: int,
     epsilon: Array | None = None,
@@ -93,123 +64,83 @@ def posit(
 ) -> Start:
     """The POSIT iteration on pinhole points.
 
-    points_in_obj: (n, 3), not coplanar. x, y: (n, b), image points at depth 1.
+    points_in_obj: (n, 3), not coplanar. image: (2, n, b), x and y at depth 1.
     tol: stop when I and J change by less than this, relative to their length.
     epsilon: (n - 1, b) first guess of the relative depths, zero if None. step: fraction of each update that is taken.
     Source:
         Paper, equations 21 to 25; DeMenthon and Davis 1995.
     """
-    offsets = points_in_obj[1:] - points_in_obj[0]
-    solver: Array = np.linalg.pinv(offsets)
-    b = x.shape[1]
-    stacked = np.full((6, b), np.nan)  # I above J
-    iterations = np.zeros(b, dtype=np.int64)
-    converged = np.zeros(b, dtype=bool)
-    active = np.flatnonzero(np.all(np.isfinite(x) & np.isfinite(y), axis=0))
-    xa, ya = x[:, active], y[:, active]
-    epsilon = np.zeros((len(offsets), len(active))) if epsilon is None else epsilon[:, active]
-    previous = np.full((6, len(active)), np.inf)
     with np.errstate(all="ignore"):
-        for _ in range(max_iterations):
-            if not len(active):
-                break
-            vectors = _solve_scaled(solver, xa, ya, epsilon)
-            scale, k = _scale_and_axis(vectors)
-            epsilon = epsilon + step * (scale * rows(offsets, k) - epsilon)
-            change = np.max(np.abs(vectors - previous), axis=0) / scale
-            iterations[active] += 1
-            stacked[:, active] = vectors
-            done = change <= tol
-            converged[active[done]] = True
-            keep = ~done & np.isfinite(scale)
-            previous = vectors
-            if not np.all(keep):
-                active, xa, ya = active[keep], xa[:, keep], ya[:, keep]
-                epsilon, previous = epsilon[:, keep], previous[:, keep]
-        R, t = _pose(stacked, x[0], y[0], points_in_obj[0])
-    lost = ~converged
-    R[lost], t[lost] = np.nan, np.nan
+        vectors, iterations, converged = _iterate(points_in_obj, image, tol, max_iterations, epsilon, step)
+        R = nearest_frame(vectors)
+        depth = 2.0 / np.add.reduce(lengths(vectors), axis=0)
+        t = -np.einsum("ijb,j->ib", R, points_in_obj[0])
+        t += depth
+        t[:2] += (image[:, 0] - 1.0) * depth
     return Start(R, t, iterations, converged)
 
 
-def posit_checked(points_in_obj: Array, x: Array, y: Array, tol: float, max_iterations: int) -> tuple[Start, Mask]:
-    """`posit`, retried inside its limit, and a (b,) mask of the poses that reproduce their points.
-
-    The fixed point that the iteration finds need not be the pose (about one random object in a thousand), and a pose
-    need not attract it. A misfit of a tenth of the points' spread tells, and for noise-free points the poses of a
-    triangle do: one of them fits exactly. From it the same equations are iterated again with half steps, provided
-    that all points lie below atan(sqrt 2). Under noise a flat object's misfit is large and no reason to reject.
-    """
-    start = posit(points_in_obj, x, y, tol, max_iterations)
-    misfit, spread = _misfit(points_in_obj, x, y, start.R, start.t)
-    limit = CONSISTENT_MISFIT * spread
-    doubtful = np.flatnonzero(~(misfit <= DOUBTFUL_MISFIT * spread) & np.all(np.isfinite(x) & np.isfinite(y), axis=0))
-    if not len(doubtful):
-        return start, misfit <= limit
-    xd, yd = x[:, doubtful], y[:, doubtful]
-    rays = np.stack((xd.T, yd.T, np.ones_like(xd.T)), axis=-1)
-    ((R, t),) = p3p_starts(points_in_obj, rays / np.linalg.norm(rays, axis=-1, keepdims=True), 1)
-    exact = _misfit(points_in_obj, xd, yd, R, t)[0] <= EXACT_MISFIT * spread[doubtful]
-    limit[doubtful[exact]] = DOUBTFUL_MISFIT * spread[doubtful[exact]]
-    inside = np.all(np.hypot(xd, yd) < CONVERGENT_TAN, axis=0) & (t[:, 2] > 0.0)
-    again = ~(misfit[doubtful] <= limit[doubtful]) & inside
-    if np.any(again):
-        offsets = points_in_obj[1:] - points_in_obj[0]
-        epsilon = (R[again, 2] @ offsets.T).T / (t[again] + R[again] @ points_in_obj[0])[:, 2]
-        retried = posit(points_in_obj, xd[:, again], yd[:, again], tol, max_iterations, epsilon, 0.5)
-        start.put(doubtful[again], retried)
-        misfit, _ = _misfit(points_in_obj, x, y, start.R, start.t)
-    return start, misfit <= limit
-
-
-def _misfit(points_in_obj: Array, x: Array, y: Array, R: Array, t: Array) -> tuple[Array, Array]:
-    """RMS distance of reprojections from the pinhole points, and the RMS spread of those, each (b,)."""
-    with np.errstate(all="ignore"):
-        px, py, pz = np.moveaxis(points_in_obj @ np.swapaxes(R, 1, 2) + t[:, None], -1, 0)
-        misses = (px / pz).T - x, (py / pz).T - y
-        misfit = np.sqrt(np.mean(misses[0] ** 2 + misses[1] ** 2, axis=0))
-        spread = np.sqrt(np.mean((x - x.mean(axis=0)) ** 2 + (y - y.mean(axis=0)) ** 2, axis=0))
-        return np.where(np.all(pz > 0.0, axis=1), misfit, np.nan), spread
-
-
-def _solve_scaled(solver: Array, x: Array, y: Array, epsilon: Array) -> Array:
-    """I and J, (6, b), from the right-hand sides xi and eta (paper, equations 21 to 25)."""
-    factor = 1.0 + epsilon
-    return np.concatenate((rows(solver, factor * x[1:] - x[0]), rows(solver, factor * y[1:] - y[0])))
-
-
-def rows(matrix: Array, columns: Array) -> Array:
-    """matrix @ columns with a fixed order of additions, so that a batch gives the bits of single calls."""
-    total = matrix[:, :1] * columns[0]
-    for j in range(1, matrix.shape[1]):
-        total = total + matrix[:, j : j + 1] * columns[j]
-    return total
+def _iterate(
+    points_in_obj: Array, image: Array, tol: float, max_iterations: int, epsilon: Array | None, step: float
+) -> tuple[Array, NDArray[np.int64], Mask]:
+    """I and J, (2, 3, b), NaN where they do not converge, the number of iterations, and where they converge."""
+    offsets = points_in_obj[1:] - points_in_obj[0]
+    solver: Array = np.linalg.pinv(offsets)
+    b = image.shape[-1]
+    result = np.full((2, 3, b), np.nan)
+    iterations, converged = np.zeros(b, np.int64), np.zeros(b, bool)
+    depths = np.zeros((len(offsets), b)) if epsilon is None else epsilon
+    others = image[:, 1:]
+    work = _Work(np.arange(b), others, others - image[:, :1], depths, np.full((2, 3, b), np.inf))
+    active = np.isfinite(np.sum(image, axis=(0, 1)))
+    for count in range(1, max_iterations + 1):
+        if not np.all(active) and COMPRESS * np.count_nonzero(active) <= (COMPRESS - 1) * len(active):
+            kept = np.flatnonzero(active)
+            work.keep(kept)
+            active = np.ones(len(kept), bool)
+        if not len(active):
+            break
+        right = work.epsilon * work.image
+        right += work.base
+        vectors = np.einsum("ij,ajb->aib", solver, right)
+        scale, k = _scale_and_axis(vectors)
+        depths = np.einsum("ni,ib->nb", offsets, k)
+        work.epsilon = depths if step == 1.0 else work.epsilon + step * (depths - work.epsilon)
+        work.previous -= vectors
+        change = np.einsum("aib,aib->b", work.previous, work.previous)
+        work.previous = vectors
+        small = change <= (tol * scale) ** 2
+        gone = active & (small | ~np.isfinite(scale))
+        if np.any(gone) or count == max_iterations:
+            gone = active if count == max_iterations else gone
+            good = np.flatnonzero(gone & small)
+            result[..., work.rows[good]], converged[work.rows[good]] = pick(vectors, good), True
+            iterations[work.rows[gone]] = count
+            active = active & ~gone
+    return result, iterations, converged
 
 
 def _scale_and_axis(vectors: Array) -> tuple[Array, Array]:
-    """Scale 1 / Z0, the mean length of I and J, and the unit third axis k."""
-    i, j = vectors[:3], vectors[3:]
-    scale = 0.5 * (norm(i) + norm(j))
-    k = cross(i, j)
-    return scale, k / norm(k)
+    """Scale 1 / Z0, the mean length of I and J, (2, 3, b), and the third axis k of this length, (3, b)."""
+    size = lengths(vectors)
+    scale = 0.5 * (size[0] + size[1])
+    k = cross(vectors[0], vectors[1])
+    k *= scale / np.sqrt(np.einsum("ib,ib->b", k, k))
+    return scale, k
+
+
+def lengths(vectors: Array) -> Array:
+    """(2, b) lengths of I and J, (2, 3, b)."""
+    return np.sqrt(np.einsum("aib,aib->ab", vectors, vectors))
 
 
 def nearest_frame(vectors: Array) -> Array:
-    """(b, 3, 3) rotations with rows i, j, k from I above J, (6, b), the defect shared between i and j."""
-    i, j = vectors[:3] / norm(vectors[:3]), vectors[3:] / norm(vectors[3:])
-    total, difference = i + j, i - j
-    total, difference = total / norm(total), difference / norm(difference)
-    i, j = (total + difference) * np.sqrt(0.5), (total - difference) * np.sqrt(0.5)
-    return np.ascontiguousarray(np.stack((i, j, cross(i, j))).transpose(2, 0, 1))
-
-
-def _pose(vectors: Array, x0: Array, y0: Array, first: Array) -> tuple[Array, Array]:
-    """Rotation and position of the object frame from I above J and M0's pinhole and object coordinates."""
-    rotation = nearest_frame(vectors)
-    depth = 2.0 / (norm(vectors[:3]) + norm(vectors[3:]))
-    return rotation, np.stack((x0 * depth, y0 * depth, depth), axis=-1) - rotation @ first
-
-
-def norm(vector: Array) -> Array:
-    """Length of (3, ...) vectors along the first axis."""
-    return np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
+    """(3, 3, b) rotations with rows i, j, k from I and J, (2, 3, b), the defect shared between i and j."""
+    i, j = vectors / lengths(vectors)[:, None]
+    both = np.stack((i + j, i - j))
+    both *= np.sqrt(0.5) / lengths(both)[:, None]
+    rotation = np.empty((3, 3, vectors.shape[-1]))
+    np.add(both[0], both[1], out=rotation[0])
+    np.subtract(both[0], both[1], out=rotation[1])
+    rotation[2] = cross(rotation[0], rotation[1])
+    return rotation

@@ -25,16 +25,19 @@ class Problem:
     weights: Array  # (2, 2, n)
     absolute: bool  # whether the covariance is absolute: sigma_px was given
 
-    @property
-    def uv(self) -> tuple[Array, Array]:
-        """Image coordinates u, v, each (n, b), px."""
-        return self.points_px[..., 0].T, self.points_px[..., 1].T
+    def part(self, rows: slice) -> Problem:
+        """Some of the images; what is marked there is marked here."""
+        return replace(self, points_px=self.points_px[rows], status=self.status[rows])
 
     def chunks(self, size: int) -> Iterator[Problem]:
         """The batch in pieces whose arrays stay in the cache; an empty batch is one piece."""
         for i in range(0, max(1, len(self.status)), size):
-            rows = slice(i, i + size)
-            yield replace(self, points_px=self.points_px[rows], status=self.status[rows])
+            yield self.part(slice(i, i + size))
+
+    @property
+    def uv(self) -> tuple[Array, Array]:
+        """Image coordinates u, v, each (n, b), px."""
+        return self.points_px[..., 0].T, self.points_px[..., 1].T
 
 
 def validate(
@@ -57,13 +60,16 @@ def validate(
         raise ValueError(f"points_px has shape {pixels.shape}; it must be ({len(obj)}, 2) or (b, {len(obj)}, 2)")
     single = pixels.ndim == 2
     pixels = pixels[None] if single else pixels
-    finite = np.all(np.isfinite(pixels), axis=(1, 2))
-    status = np.where(finite, Status.OK, Status.NON_FINITE).astype(STATUS_TYPE)
-    pixels = np.where(finite[:, None, None], pixels, 0.0)
+    status = np.full(len(pixels), Status.OK, STATUS_TYPE)
+    if not np.all(np.isfinite(pixels)):
+        lost = ~np.all(np.isfinite(pixels), axis=(1, 2))
+        status[lost] = Status.NON_FINITE
+        pixels = np.where(lost[:, None, None], 0.0, pixels)
     weights = whitening(None if sigma_px is None else np.asarray(sigma_px, dtype=np.float64), len(obj))
     return Problem(obj, pixels, camera, status, weights, sigma_px is not None), single
 
 
 def mark(status: NDArray[np.str_], failed: Mask, reason: Status) -> None:
     """Give rows that are still OK a reason to fail; the first reason stays."""
-    status[failed & (status == Status.OK)] = reason
+    if np.any(failed):
+        status[failed & (status == Status.OK)] = reason

@@ -8,12 +8,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eposit.arrays import Array, Mask, cross
+from eposit.arrays import Array, Mask, cross, pick
 from eposit.camera import Camera
-from eposit.pose import Pose
-from eposit.posit import nearest_frame, norm, rows
+from eposit.posit import lengths, nearest_frame
 from eposit.problem import Problem, mark, validate
-from eposit.solution import Solution, Status, join
+from eposit.solution import Solution, Status, blank, join
 
 MAX_ITERATIONS = 50_000
 CHUNK = 4096  # problems worked on at a time
@@ -61,59 +60,65 @@ def _solve(problem: Problem, theta_centre: tuple[float, float] | None, tol: floa
     camera, status = problem.camera, problem.status.copy()
     f = 0.5 * (camera.fx + camera.fy)
     u, v = problem.uv
-    first = _ratio(camera, f, u - camera.cx, v - camera.cy)
-    ratio = first if theta_centre is None else _ratio(camera, f, u - theta_centre[0], v - theta_centre[1])
-    radius = np.hypot(u - camera.cx, v - camera.cy)
-    if theta_centre is not None:
-        radius = np.maximum(radius, np.hypot(u - theta_centre[0], v - theta_centre[1]))
-    mark(status, np.any(radius > f, axis=0), Status.OUTSIDE_LENS)
     x, y = (u - camera.cx) / f, (v - camera.cy) / f
-    vectors, iterations = _iterate(problem.points_in_obj, x, y, first, ratio, tol, max_iterations)
+    first = ratio = _ratio(camera, x, y)
+    mark(status, np.any(np.hypot(x, y) > 1.0, axis=0), Status.OUTSIDE_LENS)
+    if theta_centre is not None:
+        x_theta, y_theta = (u - theta_centre[0]) / f, (v - theta_centre[1]) / f
+        ratio = _ratio(camera, x_theta, y_theta)
+        mark(status, np.any(np.hypot(x_theta, y_theta) > 1.0, axis=0), Status.OUTSIDE_LENS)
+    image = np.stack((x, y))
+    vectors, iterations = _iterate(problem.points_in_obj, image, first, ratio, tol, max_iterations)
     with np.errstate(all="ignore"):
-        scale = 0.5 * (norm(vectors[:3]) + norm(vectors[3:]))
-        t = np.stack((x[0] * ratio[0] / scale, y[0] * ratio[0] / scale, ratio[0] ** 2 / scale), axis=-1)
+        scale = 0.5 * np.add.reduce(lengths(vectors), axis=0)
+        t = np.stack((*image[:, 0] * ratio[0], ratio[0] ** 2)) / scale
         R = nearest_frame(vectors)
-    t = t - (R @ problem.points_in_obj[0])
-    mark(status, ~np.all(np.isfinite(t), axis=1), Status.NOT_CONVERGED)
-    ok = status == Status.OK
-    pose = Pose(np.where(ok[:, None, None], R, np.nan), np.where(ok[:, None], t, np.nan))
-    nothing = np.full(len(ok), np.nan)
-    return Solution(status, pose, iterations, nothing, np.full((len(ok), 6, 6), np.nan))
+        t -= np.einsum("ijb,j->ib", R, problem.points_in_obj[0])
+    mark(status, ~np.all(np.isfinite(t), axis=0), Status.NOT_CONVERGED)
+    found = blank(status, False)
+    found.clear()
+    ok = np.flatnonzero(status == Status.OK)
+    found.cam_from_obj.R[ok], found.cam_from_obj.t[ok] = R[..., ok].transpose(2, 0, 1), t[:, ok].T
+    found.iterations[:] = iterations
+    return found
 
 
-def _ratio(camera: Camera, f: float, x: Array, y: Array) -> Array:
+def _ratio(camera: Camera, x: Array, y: Array) -> Array:
     """G(theta) = cos(theta) / g(theta) with theta = asin(r / f), NaN where that has no value."""
     with np.errstate(all="ignore"):
-        theta = np.arcsin(np.hypot(x, y) / f)
+        theta = np.arcsin(np.hypot(x, y))
         if camera.lens == "equidistance":
             return np.cos(theta) / (np.sin(theta) / theta)
         return np.cos(theta) / camera.law.raw_g(theta)
 
 
 def _iterate(
-    points_in_obj: Array, x: Array, y: Array, first: Array, ratio: Array, tol: float, max_iterations: int
+    points_in_obj: Array, image: Array, first: Array, ratio: Array, tol: float, max_iterations: int
 ) -> tuple[Array, NDArray[np.int64]]:
-    """I above J, (6, b), and the number of iterations, (b,). x, y, first, ratio: (n, b)."""
+    """I and J, (2, 3, b), and the number of iterations, (b,). image: (2, n, b). first, ratio: (n, b)."""
     offsets = points_in_obj[1:] - points_in_obj[0]
     solver: Array = np.linalg.pinv(offsets)
-    b = x.shape[1]
-    result, iterations = np.full((6, b), np.nan), np.zeros(b, np.int64)
+    b = image.shape[-1]
+    result, iterations = np.full((2, 3, b), np.nan), np.zeros(b, np.int64)
     active = np.flatnonzero(np.all(np.isfinite(first + ratio), axis=0))
-    epsilon, previous = np.zeros((len(offsets), len(active))), np.full((6, len(active)), np.inf)
+    epsilon, previous = np.zeros((len(offsets), len(active))), np.full((2, 3, len(active)), np.inf)
+    flat, g0 = image[..., active] / first[:, active], first[0, active]
     with np.errstate(all="ignore"):
-        for count in range(max_iterations):
+        for count in range(1, max_iterations + 1):
             if not len(active):
                 break
-            g = (ratio if count else first)[:, active]
-            wide, high = x[:, active] / g, y[:, active] / g
-            factor = 1.0 + epsilon
-            vectors = np.concatenate(
-                (rows(solver, factor * wide[1:] - wide[0]), rows(solver, factor * high[1:] - high[0]))
-            )
-            scale = 0.5 * (norm(vectors[:3]) + norm(vectors[3:]))
-            i, j = (part / (norm(part) * g[0]) for part in (vectors[:3], vectors[3:]))
-            epsilon = rows(offsets, cross(i, j)) * scale / g[0] ** 2
-            result[:, active], iterations[active] = vectors, count + 1
-            keep: Mask = (np.max(np.abs(vectors - previous), axis=0) > tol * scale) & np.isfinite(scale)
-            active, epsilon, previous = active[keep], epsilon[:, keep], vectors[:, keep]
+            vectors = np.einsum("ij,ajb->aib", solver, (1.0 + epsilon) * flat[:, 1:] - flat[:, :1])
+            size = lengths(vectors)
+            scale = 0.5 * np.add.reduce(size, axis=0)
+            k = cross(*(vectors / size[:, None])) / g0**2
+            epsilon = np.einsum("ni,ib->nb", offsets, k) * scale / g0**2
+            keep: Mask = (np.max(np.abs(vectors - previous), axis=(0, 1)) > tol * scale) & np.isfinite(scale)
+            if not np.all(keep) or count == max_iterations:
+                result[..., active], iterations[active] = vectors, count
+                rows = np.flatnonzero(keep)
+                active, epsilon, vectors = active[rows], pick(epsilon, rows), pick(vectors, rows)
+                flat, g0 = pick(flat, rows), g0[rows]
+            if count == 1:
+                flat, g0 = image[..., active] / ratio[:, active], ratio[0, active]
+            previous = vectors
     return result, iterations

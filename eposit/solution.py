@@ -7,6 +7,7 @@ from enum import StrEnum
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from eposit.arrays import Array
 from eposit.pose import Pose
@@ -36,13 +37,34 @@ class Solution:
     cam_from_obj: Pose  # R (3, 3) and t (3,) in the unit of points_in_obj
     iterations: Any  # of the linear start and the refinement together
     reprojection_rmse_px: Any  # root of the mean squared distance between image points and reprojections, px
-    covariance: Array  # (6, 6): rotation vector on the left in the camera frame (rad), then t
+    covariance: Array  # (6, 6): rotation vector on the left in the camera frame (rad), then t; NaN for linear methods
 
     def first(self) -> Solution:
         """The single problem of a batch of one, without its leading axis."""
         pose = Pose(self.cam_from_obj.R[0], self.cam_from_obj.t[0])
         status, rmse = Status(str(self.status[0])), float(self.reprojection_rmse_px[0])
         return Solution(status, pose, int(self.iterations[0]), rmse, self.covariance[0])
+
+    def part(self, rows: slice) -> Solution:
+        """Some rows of a batch, to read and to write."""
+        pose = Pose(self.cam_from_obj.R[rows], self.cam_from_obj.t[rows])
+        return Solution(
+            self.status[rows], pose, self.iterations[rows], self.reprojection_rmse_px[rows], self.covariance[rows]
+        )
+
+    def clear(self) -> None:
+        """Set a batch's numbers to NaN, its iterations to zero."""
+        for values in (self.cam_from_obj.R, self.cam_from_obj.t, self.reprojection_rmse_px, self.covariance):
+            if values.flags.writeable:
+                values[:] = np.nan
+        self.iterations[:] = 0
+
+
+def blank(status: NDArray[np.str_], weighs: bool) -> Solution:
+    """A batch to write to. weighs: whether there will be covariances; if not, they are NaN and read-only."""
+    b = len(status)
+    spread = np.empty((b, 6, 6)) if weighs else np.broadcast_to(np.nan, (b, 6, 6))
+    return Solution(status, Pose(np.empty((b, 3, 3)), np.empty((b, 3))), np.zeros(b, np.int64), np.empty(b), spread)
 
 
 def join(parts: list[Solution]) -> Solution:

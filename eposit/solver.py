@@ -5,17 +5,22 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eposit.arrays import Array, Mask
+from eposit.arrays import Array, pick
+from eposit.best import best_poses
 from eposit.camera import Camera
-from eposit.pose import Pose
-from eposit.posit import COPLANAR_CONDITION, Start, condition, posit_checked, rectify_bearings, rectify_paper
+from eposit.descent import Minima
+from eposit.linear import posit_checked
+from eposit.normal import View, cost, residuals
+from eposit.posit import Start
 from eposit.problem import Problem, mark, validate
-from eposit.refine import Refined, covariance, normal_equations, refine_poses, residuals, whitening
-from eposit.solution import Solution, Status, join
-from eposit.starts import centred_points, rim_bearings, starts, turn_back
+from eposit.rectify import centred_image, inside_rim, rectify_paper, rectify_rays, unit_rays
+from eposit.refine import whitening
+from eposit.solution import Solution, Status, blank
+from eposit.starts import Shape, turn_back
 
 METHODS = ("best", "centred", "eposit", "posit")
-CHUNK = 4096  # problems worked on at a time
+CHUNK = 16384  # problems worked on at a time, fewer if they have many points: NumPy's calls spread over them
+CHUNK_POINTS = 4 * CHUNK
 
 
 def solve(
@@ -42,7 +47,8 @@ def solve(
     theta_centre: for "eposit" only, the point, px, from which theta is measured; the paper takes the image centre.
 
     Returns:
-        Solution; a batch gives the same poses as single calls to 1e-12.
+        Solution; a batch gives the same poses as single calls to 1e-12. The covariance is that of "best"; the other
+        methods do not weigh their points, so that it would not be theirs: NaN.
     Raises:
         ValueError: wrong shapes, fewer than four points, non-finite object points, an unknown method or sigma.
     Source:
@@ -54,104 +60,101 @@ def solve(
     if theta_centre is not None and method != "eposit":
         raise ValueError(f"theta_centre goes with method 'eposit', not {method!r}; leave it out")
     problem, single = validate(points_in_obj, points_px, camera, sigma_px)
-    parts: list[Solution] = []
-    for part in problem.chunks(CHUNK):
-        if method == "best":
-            parts.append(_solve_best(part, refine))
-        else:
-            parts.append(_solve_linear(part, method, tol, max_iterations, theta_centre))
-    return parts[0].first() if single else join(parts)
+    shape = Shape.of(problem.points_in_obj)
+    solution = blank(problem.status, method == "best")
+    size = max(1, min(CHUNK, CHUNK_POINTS // len(problem.points_in_obj)))
+    for i in range(0, len(problem.status), size):
+        rows = slice(i, i + size)
+        part, piece = problem.part(rows), solution.part(rows)
+        with np.errstate(all="ignore"):
+            if method == "best":
+                _solve_best(part, shape, refine, piece)
+            else:
+                _solve_linear(part, shape, method, tol, max_iterations, theta_centre, piece)
+    return solution.first() if single else solution
 
 
 def _solve_linear(
-    problem: Problem, method: str, tol: float, max_iterations: int, theta_centre: tuple[float, float] | None
-) -> Solution:
-    status = problem.status.copy()
-    bearings = problem.camera.bearing(problem.points_px)
-    mark(status, _any_row(np.isnan(bearings)), Status.OUTSIDE_LENS)
-    if condition(problem.points_in_obj) > COPLANAR_CONDITION:
-        return _coplanar(problem, status)
-    back = np.broadcast_to(np.eye(3), (len(status), 3, 3))
-    if method == "centred":
-        x, y, back = centred_points(bearings)
+    problem: Problem,
+    shape: Shape,
+    method: str,
+    tol: float,
+    max_iterations: int,
+    theta_centre: tuple[float, float] | None,
+    out: Solution,
+) -> None:
+    view = View.of(problem.camera, problem.points_in_obj, problem.points_px, whitening(None, len(shape.points_in_obj)))
+    back = None
+    if method != "centred" and problem.camera.lens == "perspective":
+        image = view.seen.transpose(1, 0, 2)  # pinhole points already, and all in front of the camera
     else:
-        mark(status, np.any(bearings[..., 2] <= 0.0, axis=1), Status.FIELD_ANGLE)
-        if method == "eposit":
-            x, y = rectify_paper(problem.points_px, problem.camera, theta_centre)
+        rays = unit_rays(problem.camera, view.seen)
+        _mark_rays(problem.status, rays, method != "centred" and shape.solid)
+        if method == "centred":
+            image, back = centred_image(rays)
+        elif method == "eposit":
+            image = rectify_paper(problem.camera, view.seen, theta_centre)
         else:
-            x, y = rectify_bearings(bearings)
-    start, reproduces = posit_checked(problem.points_in_obj, x, y, tol, max_iterations)
-    mark(status, ~start.converged, Status.NOT_CONVERGED)
-    mark(status, ~reproduces, Status.INCONSISTENT)
-    return finish(problem, turn_back(back, start), status)
+            image = rectify_rays(rays)
+    if not shape.solid:
+        mark(problem.status, np.ones(len(problem.status), bool), Status.COPLANAR)
+        out.clear()
+        return
+    start, reproduces = posit_checked(shape, image, tol, max_iterations)
+    mark(problem.status, ~start.converged, Status.NOT_CONVERGED)
+    mark(problem.status, ~reproduces, Status.INCONSISTENT)
+    found = start if back is None else turn_back(back, start)
+    _write(out, problem.status, found, cost(residuals(view, found.R, found.t)), len(shape.points_in_obj))
 
 
-def _solve_best(problem: Problem, refined: bool) -> Solution:
-    status = problem.status.copy()
-    bearings = rim_bearings(problem.camera, problem.points_px)
-    mark(status, _any_row(np.isnan(bearings)), Status.OUTSIDE_LENS)
-    found = starts(problem.points_in_obj, bearings)
-    if not found:
-        return _coplanar(problem, status)
-    candidates = _candidates(problem, found, refined)
-    best = _lowest(candidates, len(found))
-    mark(status, ~(best.converged & np.isfinite(best.cost)), Status.NOT_CONVERGED)
-    return finish(problem, Start(best.R, best.t, best.steps, best.converged), status)
+def _solve_best(problem: Problem, shape: Shape, refined: bool, out: Solution) -> None:
+    view = View.of(problem.camera, problem.points_in_obj, problem.points_px, problem.weights)
+    rays = unit_rays(problem.camera, inside_rim(problem.camera, view.seen))
+    _mark_rays(problem.status, rays, False)
+    if not shape.usable:
+        mark(problem.status, np.ones(len(problem.status), bool), Status.COPLANAR)
+        out.clear()
+        return
+    found = best_poses(shape, view, rays, refined)
+    mark(problem.status, ~(found.poses.converged & np.isfinite(found.cost)), Status.NOT_CONVERGED)
+    finish(problem, found, out)
 
 
-def _candidates(problem: Problem, found: list[Start], refined: bool) -> Refined:
-    """All starts of all problems as one batch, start by start, refined or as they are."""
-    u, v = (np.tile(pixels, (1, len(found))) for pixels in problem.uv)
-    R, t = np.concatenate([start.R for start in found]), np.concatenate([start.t for start in found])
-    begun = np.concatenate([start.iterations for start in found])
-    converged = np.concatenate([start.converged for start in found])
-    if refined:
-        result = refine_poses(problem.camera, problem.points_in_obj, u, v, R, t, problem.weights)
-        return Refined(result.R, result.t, result.cost, result.steps + begun, result.converged)
-    weighted = residuals(problem.camera, problem.points_in_obj, u, v, R, t, problem.weights)
-    cost = np.nan_to_num(np.sum(weighted**2, axis=(0, 1)), nan=np.inf)
-    return Refined(R, t, cost, begun, converged)
+def finish(problem: Problem, found: Minima, out: Solution) -> None:
+    """Write poses, RMSE and covariance where the status is OK."""
+    n, costs, spread = len(problem.points_in_obj), found.cost, found.spread
+    if problem.absolute:
+        plain = View.of(problem.camera, problem.points_in_obj, problem.points_px, whitening(None, n))
+        costs = cost(residuals(plain, found.poses.R, found.poses.t))
+    else:
+        spread = spread * (costs / (2 * n - 6))
+    rows = _write(out, problem.status, found.poses, costs, n)
+    if rows is None:
+        out.covariance[:] = spread.transpose(2, 0, 1)
+    elif len(rows):
+        out.covariance[rows] = pick(spread, rows).transpose(2, 0, 1)
 
 
-def _lowest(candidates: Refined, starts_each: int) -> Refined:
-    """For each problem the converged candidate of lowest cost; the earlier one where costs are equal."""
-    cost = np.where(candidates.converged, candidates.cost, np.inf).reshape(starts_each, -1)
-    rows = np.argmin(cost, axis=0) * cost.shape[1] + np.arange(cost.shape[1])
-    R, t, converged = candidates.R[rows], candidates.t[rows], candidates.converged[rows]
-    return Refined(R, t, candidates.cost[rows], candidates.steps[rows], converged)
-
-
-def _rmse(problem: Problem, R: Array, t: Array) -> Array:
-    u, v = problem.uv
-    plain = whitening(None, len(problem.points_in_obj))
-    with np.errstate(invalid="ignore", over="ignore"):
-        misses = residuals(problem.camera, problem.points_in_obj, u, v, R, t, plain)
-        return np.sqrt(np.mean(np.sum(misses**2, axis=0), axis=0))
-
-
-def _any_row(values: Mask) -> Mask:
-    return np.asarray(np.any(values, axis=tuple(range(1, values.ndim))))
-
-
-def _coplanar(problem: Problem, status: NDArray[np.str_]) -> Solution:
-    mark(status, np.ones(len(status), bool), Status.COPLANAR)
-    b = len(status)
-    nothing = Start(np.full((b, 3, 3), np.nan), np.full((b, 3), np.nan), np.zeros(b, np.int64), np.zeros(b, bool))
-    return finish(problem, nothing, status)
-
-
-def finish(problem: Problem, found: Start, status: NDArray[np.str_]) -> Solution:
-    """The result of b problems: NaN where the status is not OK, RMSE and covariance of the rest."""
+def _write(out: Solution, status: NDArray[np.str_], found: Start, costs: Array, n: int) -> NDArray[np.int64] | None:
+    """Write poses and RMSE where the status is OK; those rows, None for all."""
     ok = status == Status.OK
-    R, t = np.where(ok[:, None, None], found.R, np.nan), np.where(ok[:, None], found.t, np.nan)
-    rmse = np.where(ok, _rmse(problem, R, t), np.nan)
-    spread = np.full((len(ok), 6, 6), np.nan)
-    if np.any(ok):
-        u, v = problem.uv
-        normal, _ = normal_equations(
-            problem.camera, problem.points_in_obj, u[:, ok], v[:, ok], R[ok], t[ok], problem.weights
-        )
-        n = len(problem.points_in_obj)
-        factor = 1.0 if problem.absolute else rmse[ok] ** 2 * n / (2 * n - 6)
-        spread[ok] = covariance(normal) * np.reshape(factor, (-1, 1, 1))
-    return Solution(status, Pose(R, t), found.iterations, rmse, spread)
+    if np.all(ok):
+        out.cam_from_obj.R[:], out.cam_from_obj.t[:] = found.R.transpose(2, 0, 1), found.t.T
+        np.sqrt(costs / n, out=out.reprojection_rmse_px)
+        out.iterations[:] = found.iterations
+        return None
+    rows = np.flatnonzero(ok)
+    out.clear()
+    out.cam_from_obj.R[rows] = pick(found.R, rows).transpose(2, 0, 1)
+    out.cam_from_obj.t[rows] = pick(found.t, rows).T
+    out.reprojection_rmse_px[rows] = np.sqrt(costs[rows] / n)
+    out.iterations[:] = found.iterations
+    return rows
+
+
+def _mark_rays(status: NDArray[np.str_], rays: Array, forward: bool) -> None:
+    """Outside the lens where there is no ray; beyond the field of POSIT where it does not point forward."""
+    z = np.minimum.reduce(rays[:, 2], axis=0)
+    mark(status, np.isnan(z), Status.OUTSIDE_LENS)
+    if forward:
+        mark(status, z <= 0.0, Status.FIELD_ANGLE)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import eposit
 from datasets.plan import plan
 from datasets.recipe import load_recipe
 from pipelines.bench.cases import scaled
@@ -11,6 +12,7 @@ from pipelines.bench.growth import exponent
 from pipelines.bench.machine import LIBRARIES, facts
 from pipelines.bench.rays import RAYS, primary_rays
 from pipelines.bench.rows import TITLES, compared, markdown
+from pipelines.bench.solver import CAMERA, POINTS, draws, solvers
 from pipelines.bench.timing import Times, in_turn, total
 from render.master import target_region
 
@@ -74,3 +76,19 @@ def test_an_unknown_part_is_a_sentence(cli):
     assert outcome.code == 2
     assert outcome.err.count("\n") == 1
     assert all(name in outcome.err for name in parts())
+
+
+def test_solvers_are_measured_on_the_papers_draws():
+    pixels = draws(722)
+    assert pixels.shape == (722, 4, 2)
+    # Two rounds of the helix differ by noise alone: 0.4 px sqrt 2, good to 0.0074 over
+    # 2888 differences; five of those.
+    assert (pixels[361:] - pixels[:361]).std() == pytest.approx(0.566, abs=0.037)
+    for solver in solvers():
+        found = solver.call(POINTS, pixels[:361], CAMERA)
+        assert set(found.status) == {"ok"}
+        # A helix of radius 141 mm from 2000 to 2090 mm; POSIT's noise in depth is 14 mm.
+        depth = found.cam_from_obj.t[:, 2] - np.linspace(2000.0, 2090.0, 361)
+        assert abs(np.median(depth)) < 5.0
+        assert solver.call(POINTS, pixels[0], CAMERA).status == "ok"
+    assert {f"solve {name}" for name in eposit.METHODS} < {solver.name for solver in solvers()}

@@ -1,72 +1,100 @@
-"""Throughput of `eposit.solve`, one call at a time and in a batch, against PoseLib in a loop."""
+"""Poses per second of every solver, one call at a time and in a batch, against PoseLib's p3p in a loop.
+
+All run on the draws of the paper's simulation: four points, 0.4 px of noise, the pinhole camera. The solvers use no
+threads of their own; the linear algebra under NumPy may: set OPENBLAS_NUM_THREADS=1 for figures of one core.
+"""
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 import eposit
-from datasets.plan import plan
 from datasets.recipe import Recipe
+from eposit import Camera, Pose, released
 from eposit.arrays import Array
+from eposit.pose import rotation_from_euler
 from pipelines.bench.rows import Row, compared
 from pipelines.bench.timing import Times, in_turn
 
 PART = "solver"
-NOISE_PX = 0.1
+POINTS = np.array([(0.0, 0.0, 0.0), (200.0, 0.0, 0.0), (0.0, 200.0, 0.0), (0.0, 0.0, -50.0)])  # mm, the paper's object
+CAMERA = Camera(
+    lens="perspective", fx=1378.65, fy=1381.37, cx=807.41661, cy=602.4737, width=1600, height=1200
+)  # fmt: skip
+NOISE_PX = 0.4
+BATCH = 100_000  # poses in a batch; what takes longer than a second of it gets fewer
 SINGLE = 20  # poses in a measurement of single calls
-FOUR_BATCH, ALL_BATCH = 4096, 64  # poses in a batch of four points each, and of all points each
+LOOPED = 2000  # calls of PoseLib in a measurement
+
+Call = Callable[[Array, Array, Camera], Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Solver:
+    """A row of the table: points (n, 3), image points (n, 2) or a batch of them, camera."""
+
+    name: str
+    call: Call
+    batch: int = BATCH  # poses in its batch; 0 for a solver that takes one image at a time
+
+
+def solvers() -> list[Solver]:
+    """The solvers measured: a new one is a line here."""
+    methods = [Solver(f"solve {name}", functools.partial(eposit.solve, method=name)) for name in eposit.METHODS]
+    return [*methods, Solver("released", released.solve)]
 
 
 def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
-    """Rows for four points and for all, single calls and a batch; perspective, the only lens that PoseLib shares."""
-    del poses  # the numbers of poses are its own
-    camera = next((spec for spec in recipe.cameras if spec.lens == "perspective"), recipe.cameras[0]).true_camera()
-    camera = camera.replace(lens="perspective", coefficients=())
-    pose = plan(recipe)[0].cam_from_obj
-    for points, count in (
-        (recipe.target.points[recipe.four_indices()], FOUR_BATCH),
-        (recipe.target.points, ALL_BATCH),
-    ):
-        true = camera.project(pose.apply(points))
-        pixels = true + NOISE_PX * np.random.default_rng(0).standard_normal((count, *true.shape))
-        size = f"{len(points)} points"
-        single = [functools.partial(eposit.solve, points, image, camera) for image in pixels[:SINGLE]]
-        batch = functools.partial(eposit.solve, points, pixels, camera)
-        robust, minimal = _robust(points, camera), _minimal(points, camera)
-        few = pixels[:SINGLE]
-        one, many, that, three = in_turn(
-            lambda calls=single: [call() for call in calls],
-            batch,
-            lambda call=robust, images=few: [call(image) for image in images],
-            lambda call=minimal, images=few: [call(image) for image in images],
-        )
-        own, many = _each(one, SINGLE), _each(many, count)
-        for name, times in (("estimate_absolute_pose", that), ("p3p, up to four candidates", three)):
-            other = f"PoseLib {name}, in a loop"
-            yield compared(PART, f"solve, {size}, single call, a pose", own, other, _each(times, SINGLE))
-            yield compared(PART, f"solve, {size}, batch of {count}, a pose", many, other, _each(times, SINGLE))
+    """Rows for every solver, single calls and a batch. The draws are the paper's and not the recipe's."""
+    del recipe, poses
+    pixels = draws(BATCH)
+    loops = {f"PoseLib {name}, in a loop": call for name, call in _poselib(pixels[:LOOPED]).items()}
+    for solver in solvers():
+        single = functools.partial(_each_alone, solver, pixels[:SINGLE])
+        yield from _rows(f"{solver.name}, 4 points, single call, a pose", single, SINGLE, loops)
+        if solver.batch:
+            batch = functools.partial(solver.call, POINTS, pixels[: solver.batch], CAMERA)
+            yield from _rows(f"{solver.name}, 4 points, batch of {solver.batch}, a pose", batch, solver.batch, loops)
 
 
-def _each(times: Times, count: int) -> Times:
+def draws(count: int) -> Array:
+    """(count, 4, 2) noisy image points, px: the frames of the paper's helix, one degree apart, again and again."""
+    t = np.arange(361.0)
+    phase = np.deg2rad(45.0 + t)
+    position = np.stack((100.0 * np.sqrt(2.0) * np.cos(phase), 100.0 * np.sqrt(2.0) * np.sin(phase), 2000.0 + 0.25 * t))
+    angles = np.repeat(np.deg2rad(20.0 + 0.1 * t)[:, None], 3, axis=1)
+    exact = CAMERA.project(Pose(rotation_from_euler(angles), position.T).apply(POINTS))
+    return exact[np.arange(count) % len(t)] + NOISE_PX * np.random.default_rng(0).standard_normal((count, 4, 2))
+
+
+def _each_alone(solver: Solver, images: Array) -> None:
+    for image in images:
+        solver.call(POINTS, image, CAMERA)
+
+
+def _rows(name: str, call: Callable[[], object], count: int, loops: dict[str, Callable[[], object]]) -> Iterator[Row]:
+    own, *others = in_turn(call, *loops.values())
+    for other, times in zip(loops, others, strict=True):
+        yield compared(PART, name, _per_pose(own, count), other, _per_pose(times, LOOPED))
+
+
+def _per_pose(times: Times, count: int) -> Times:
     return Times(times.wall / count, times.cpu / count)
 
 
-def _robust(points: Array, camera: eposit.Camera) -> Any:
-    """PoseLib's RANSAC and refinement for one image."""
+def _poselib(images: Array) -> dict[str, Callable[[], object]]:
+    """PoseLib's solver for three points, up to four candidates each, with rays made beforehand and in the loop."""
     import poselib
 
-    parameters = [camera.fx, camera.fy, camera.cx, camera.cy]
-    described = {"model": "PINHOLE", "width": camera.width, "height": camera.height, "params": parameters}
-    return lambda image: poselib.estimate_absolute_pose(image, points, described)
-
-
-def _minimal(points: Array, camera: eposit.Camera) -> Any:
-    """PoseLib's solver for three points, rays included."""
-    import poselib
-
-    first = points[:3] if np.linalg.matrix_rank(points[1:3] - points[0]) == 2 else points[[0, 1, -1]]
-    return lambda image: poselib.p3p(camera.bearing(image[:3]), first)
+    first = POINTS[:3].copy()
+    rays = list(CAMERA.bearing(images[:, :3]))
+    beforehand, inside = "p3p on given rays", "p3p and its rays"
+    return {
+        beforehand: lambda: [poselib.p3p(ray, first) for ray in rays],
+        inside: lambda: [poselib.p3p(CAMERA.bearing(image[:3]), first) for image in images],
+    }

@@ -1,0 +1,64 @@
+"""POSIT, EPOSIT and centred EPOSIT as methods of their own: the iteration, and a check of what it ends in."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from eposit.arrays import Array, Mask, pick
+from eposit.p3p import p3p_poses
+from eposit.posit import Start, posit
+from eposit.starts import Shape
+
+CONVERGENT_TAN = np.sqrt(2.0)  # tan of the incidence angle beyond which the iteration no longer contracts
+DOUBTFUL_MISFIT = 1e-3  # misfit over spread above which a fixed point is compared with the poses of a triangle
+CONSISTENT_MISFIT = 0.1  # misfit over spread above which a fixed point is no pose
+QUICK = 40  # iterations to a relative change of 1e-12: half of it in each step
+EXACT_MISFIT = 1e-7  # misfit over spread of a triangle's pose that shows noise-free points, which EPOSIT then must fit
+
+
+def posit_checked(shape: Shape, image: Array, tol: float, max_iterations: int) -> tuple[Start, Mask]:
+    """`posit`, retried inside its limit, and a (b,) mask of the poses that reproduce their points.
+
+    The fixed point that the iteration finds need not be the pose (about one random object in a thousand), and a pose
+    need not attract it. A misfit of a tenth of the points' spread tells, and for noise-free points the poses of a
+    triangle do: one of them fits exactly. From it the same equations are iterated again with half steps, provided
+    that all points lie below atan(sqrt 2). Under noise a flat object's misfit is large and no reason to reject. The
+    triangle is left out where the pose is sure to be the only one so faithful.
+    """
+    points_in_obj = shape.points_in_obj
+    start = posit(points_in_obj, image, tol, max_iterations)
+    misfit, spread = _misfit(points_in_obj, image, start.R, start.t)
+    limit = CONSISTENT_MISFIT * spread
+    quick = start.iterations <= QUICK  # the iteration contracts well: no second fixed point is near
+    clear = (misfit <= DOUBTFUL_MISFIT * spread) | (
+        quick & shape.sure(start.R, start.t, len(points_in_obj) * misfit**2)
+    )
+    doubtful = np.flatnonzero(~clear & np.isfinite(spread))
+    if not len(doubtful):
+        return start, misfit <= limit
+    some = pick(image, doubtful)
+    rays = np.stack((some[0], some[1], np.ones_like(some[0])), axis=1)
+    ((R, t),) = p3p_poses(points_in_obj, rays / np.sqrt(np.einsum("nib,nib->nb", rays, rays))[:, None], 1)
+    exact = _misfit(points_in_obj, some, R, t)[0] <= EXACT_MISFIT * spread[doubtful]
+    limit[doubtful[exact]] = DOUBTFUL_MISFIT * spread[doubtful[exact]]
+    inside = np.all(np.hypot(some[0], some[1]) < CONVERGENT_TAN, axis=0) & (t[2] > 0.0)
+    again = np.flatnonzero(~(misfit[doubtful] <= limit[doubtful]) & inside)
+    if len(again):
+        offsets = points_in_obj[1:] - points_in_obj[0]
+        forward = R[2][:, again]
+        epsilon = offsets @ forward / (t[2, again] + points_in_obj[0] @ forward)
+        start.put(doubtful[again], posit(points_in_obj, some[..., again], tol, max_iterations, epsilon, 0.5))
+        misfit, _ = _misfit(points_in_obj, image, start.R, start.t)
+    return start, misfit <= limit
+
+
+def _misfit(points_in_obj: Array, image: Array, R: Array, t: Array) -> tuple[Array, Array]:
+    """RMS distance of reprojections from the pinhole points, and the RMS spread of those, each (b,)."""
+    with np.errstate(all="ignore"):
+        point = np.einsum("nj,ijb->inb", points_in_obj, R)
+        point += t[:, None]
+        miss = point[:2] / point[2] - image
+        misfit = np.sqrt(np.einsum("anb,anb->b", miss, miss) / len(points_in_obj))
+        apart = image - np.add.reduce(image, axis=1, keepdims=True) / len(points_in_obj)
+        spread = np.sqrt(np.einsum("anb,anb->b", apart, apart) / len(points_in_obj))
+        return np.where(np.all(point[2] > 0.0, axis=0), misfit, np.nan), spread
