@@ -34,7 +34,7 @@ def fisheye_with(lens: str) -> Camera:
 
 
 def cloud(n: int) -> Array:
-    """(n, 3) the paper's four points, then others anywhere in the cube of 200 mm that they span, mm; always the same."""
+    """(n, 3) mm: the paper's four points, then the same others each time, anywhere in the cube of 200 mm at M0."""
     rng = np.random.default_rng(CLOUD_SEED)
     return np.vstack((OBJECT, rng.uniform((0.0, 0.0, -SIDE_MM), (SIDE_MM, SIDE_MM, 0.0), (max(0, n - 4), 3))))[:n]
 
