@@ -29,6 +29,7 @@ CAMERAS = {"perspective": "pinhole", "orthogonal": "orthogonal fish-eye"}
 METHODS = {"eposit": "EPOSIT", "best": "default"}
 COUNTS = (4, 6, 8, 12, 20, 55)
 RESAMPLES = 300
+TICKS = tuple(digit * 10.0**power for power in range(-2, 3) for digit in (1, 2, 5))
 
 
 def bound(draws: int = 20, seed: int = 3) -> Section:
@@ -110,6 +111,9 @@ def _lines(found: dict[str, Array]) -> str:
             axis.set_title(CAMERAS[lens], fontsize=9)
             axis.set(xlabel="points", ylabel=("RMS rotation error, deg", "RMS position error, mm")[k])
             axis.set_xticks(COUNTS, [str(n) for n in COUNTS])
+            low, high = axis.get_ylim()
+            ticks = [tick for tick in TICKS if low <= tick <= high]
+            axis.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
             axis.minorticks_off()
         axes[0].legend(fontsize=7, frameon=False)
         return svg(figure)

@@ -27,7 +27,7 @@ POINTS = {
 SPOILS = ("none", "one moved", "two exchanged")
 
 
-def robustness(trials: int = 150, seed: int = 6) -> Section:
+def robustness(trials: int = 60, seed: int = 6) -> Section:
     """Share of poses that `robust=True` recovers, and what it costs where no point is wrong."""
     head = (
         "camera",
@@ -85,7 +85,7 @@ def spoiled(pixels: Array, spoil: str, seed: int) -> tuple[Array, Mask]:
         right[rows, second] = False
         result[rows, first], result[rows, second] = pixels[rows, second], pixels[rows, first]
         return result, right
-    length, angle = np.exp(rng.uniform(*np.log(MOVED_PX), b)), rng.uniform(0.0, 2.0 * np.pi, b)
+    length, angle = np.exp(rng.uniform(np.log(MOVED_PX[0]), np.log(MOVED_PX[1]), b)), rng.uniform(0.0, 2.0 * np.pi, b)
     result[rows, first] += np.stack((length * np.cos(angle), length * np.sin(angle)), axis=1)
     return result, right
 
