@@ -76,7 +76,7 @@ class CameraCandidates:
     count: Any  # how many there are, () or (b,)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Estimate(Solution):
     """A `Solution` with the estimated camera and all candidates. The covariance is NaN: nothing here estimates it."""
 
@@ -91,7 +91,9 @@ class Estimate(Solution):
         poses = Pose(found.poses.R[0], found.poses.t[0])
         candidates = CameraCandidates(poses, found.cost[0], found.f_px[0], found.k_per_px2[0], int(found.count[0]))
         rmse, spread = one.reprojection_rmse_px, one.covariance
-        return Estimate(one.status, one.cam_from_obj, one.iterations, rmse, spread, camera, candidates)
+        return Estimate(
+            one.status, one.cam_from_obj, one.iterations, rmse, spread, camera=camera, candidates=candidates
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,5 +175,6 @@ def choose(
     camera = images.camera
     estimated = Division(f, k, camera.cx, camera.cy, camera.fy / camera.fx)
     pose, spread = Pose(R, np.where(ok[:, None], t, np.nan)), np.full((len(b), 6, 6), np.nan)
-    estimate = Estimate(status, pose, np.where(ok, steps, 0), rmse, spread, estimated, found)
+    steps = np.where(ok, steps, 0)
+    estimate = Estimate(status, pose, steps, rmse, spread, camera=estimated, candidates=found)
     return estimate.first() if images.single else estimate

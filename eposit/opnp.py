@@ -27,7 +27,7 @@ MAX_STEPS = 20
 SAME = 1e-6  # relative distance below which two polished roots are one; rounding leaves 1e-8
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class OpnpSolution(Solution):
     """A `Solution` with all real solutions of the polynomial system."""
 
@@ -269,4 +269,4 @@ def _products(y: Array) -> Array:
 
 def _extended(solution: Solution, candidates: Candidates, pairs: Any) -> OpnpSolution:
     fields = (solution.status, solution.cam_from_obj, solution.iterations, solution.reprojection_rmse_px)
-    return OpnpSolution(*fields, solution.covariance, candidates, pairs)
+    return OpnpSolution(*fields, solution.covariance, candidates=candidates, pairs=pairs)

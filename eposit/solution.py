@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eposit.arrays import Array
+from eposit.arrays import Array, Mask
 from eposit.pose import Pose
 
 
@@ -29,6 +29,11 @@ class Status(StrEnum):
 STATUS_TYPE = np.dtype(f"<U{max(len(status) for status in Status)}")
 
 
+def _all_points() -> Mask:
+    """A single True, for any number of points."""
+    return np.ones((), np.bool_)
+
+
 @dataclass(frozen=True, slots=True)
 class Solution:
     """Result of `solve` for one problem, or for a batch of b problems (then every field has a leading axis b)."""
@@ -38,12 +43,14 @@ class Solution:
     iterations: Any  # of the linear start and the refinement together
     reprojection_rmse_px: Any  # root of the mean squared distance between image points and reprojections, px
     covariance: Array  # (6, 6): rotation vector on the left in the camera frame (rad), then t; NaN for linear methods
+    inliers: Mask = field(default_factory=_all_points)  # (n,) points in use: all unless `robust` left some out
 
     def first(self) -> Solution:
         """The single problem of a batch of one, without its leading axis."""
         pose = Pose(self.cam_from_obj.R[0], self.cam_from_obj.t[0])
         status, rmse = Status(str(self.status[0])), float(self.reprojection_rmse_px[0])
-        return Solution(status, pose, int(self.iterations[0]), rmse, self.covariance[0])
+        inliers = self.inliers[0] if self.inliers.ndim else self.inliers
+        return Solution(status, pose, int(self.iterations[0]), rmse, self.covariance[0], inliers)
 
     def part(self, rows: slice) -> Solution:
         """Some rows of a batch, to read and to write."""
