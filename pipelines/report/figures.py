@@ -1,30 +1,18 @@
-"""Figures of the report, each as one SVG text. Salt and dates are fixed, so that equal data give equal text."""
+"""Figures of the report, each as one SVG text."""
 
 from __future__ import annotations
 
 import base64
-import io
-import re
 from typing import Any
 
-import matplotlib
+import matplotlib.pyplot as plt
 import numpy as np
 
-matplotlib.use("svg")
-import matplotlib.pyplot as plt
-from matplotlib.figure import Figure
-
 from eposit.arrays import Array
+from pipelines.drawing import STYLE, svg
 from pipelines.report.data import ERRORS, Series
 from render.develop import encode_png
 
-STYLE: Any = {
-    "svg.hashsalt": "eposit",
-    "font.size": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "svg.fonttype": "none",
-}
 BOXES = ("rx_error_deg", "ry_error_deg", "rz_error_deg", "tx_error_mm", "ty_error_mm", "tz_error_mm")
 
 
@@ -41,7 +29,7 @@ def along_helix(item: Series, frames: dict[int, dict[str, Any]]) -> str:
                 axis.set(xlabel="t, s", ylabel=ERRORS[column])
         axes[1].axhline(0.0, color="0.8", linewidth=0.8, zorder=0)
         axes[0].legend(fontsize=7, frameon=False)
-        return _svg(figure)
+        return svg(figure)
 
 
 def boxes(item: Series, frames: dict[int, dict[str, Any]]) -> str:
@@ -56,7 +44,7 @@ def boxes(item: Series, frames: dict[int, dict[str, Any]]) -> str:
             axis.axhline(0.0, color="0.8", linewidth=0.8, zorder=0)
             axis.set_title(ERRORS[column], fontsize=9)
             axis.tick_params(axis="x", rotation=60)
-        return _svg(figure)
+        return svg(figure)
 
 
 def picture(image: Any, region: tuple[int, int, int, int], points: Array, width: int = 300) -> str:
@@ -79,10 +67,3 @@ def picture(image: Any, region: tuple[int, int, int, int], points: Array, width:
         f'<svg viewBox="0 0 {w} {h}" width="{width}" xmlns="http://www.w3.org/2000/svg">'
         f'<image href="data:image/png;base64,{data}" width="{w}" height="{h}"/>{"".join(marks)}</svg>'
     )
-
-
-def _svg(figure: Figure) -> str:
-    buffer = io.StringIO()
-    figure.savefig(buffer, format="svg", metadata={"Date": None})
-    plt.close(figure)
-    return re.sub(r"^.*?(?=<svg)", "", buffer.getvalue(), flags=re.S)
