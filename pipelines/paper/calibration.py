@@ -62,4 +62,4 @@ def calibrate(
         R[i], t[i] = cv2.Rodrigues(turn)[0], np.ravel(place)
         again, _ = cv2.fisheye.projectPoints(points.reshape(-1, 1, 3), turn, place, matrix, coefficients)
         rmse[i] = np.sqrt(np.mean(np.sum((again.reshape(-1, 2) - seen[0]) ** 2, axis=1)))
-    return Calibration(matrix, np.ravel(coefficients), Pose(R, t), rmse)
+    return Calibration(np.asarray(matrix, np.float64), np.asarray(coefficients, np.float64).ravel(), Pose(R, t), rmse)

@@ -1,8 +1,8 @@
-"""The paper's experiment: OpenCV's calibration and EPOSIT on 30 pictures, and, beyond the paper, both against the truth."""
+"""The paper's experiment: OpenCV's calibration and EPOSIT on 30 pictures, both against each other and the truth."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -157,15 +157,15 @@ def _summary(found: Found, detector: str) -> Table:
             )
         )  # fmt: skip
     note = (
-        f"f {found.camera.matrix[0, 0]:.2f} and {found.camera.matrix[1, 1]:.2f}, centre {found.camera.matrix[0, 2]:.2f} "
-        f"and {found.camera.matrix[1, 2]:.2f} px by the calibration; the truth is {pictures.true.fx} and "
+        f"f {found.camera.matrix[0, 0]:.2f} and {found.camera.matrix[1, 1]:.2f}, centre "
+        f"{found.camera.matrix[0, 2]:.2f} and {found.camera.matrix[1, 2]:.2f} px by the calibration; the truth is {pictures.true.fx} and "
         f"{pictures.true.fy}, {pictures.true.cx} and {pictures.true.cy}."
     )
     if isinstance(found.at_once, str):
         note += f" The calibration in one call ends in an error: {found.at_once}."
     head = (
         "way", "answers", "rotation, rad", "x y z, mm", "reprojection, px", "of all points, px",
-        *(f"{number}th: rotation, rad; translation, mm" for number in HARD),
+        *(f"picture {number}: rotation, rad; translation, mm" for number in HARD),
     )  # fmt: skip
     return Table(
         f"Errors against the truth, medians of the 27 ordinary pictures, corners of {detector}", head, tuple(rows), note
@@ -199,5 +199,5 @@ def _triple(values: Array, digits: int) -> str:
     """Three numbers; of (k, 3) their medians."""
     if not values.size:
         return "none"
-    shown: Sequence[float] = np.median(values, axis=0) if values.ndim == 2 else values
+    shown = np.median(values, axis=0) if values.ndim == 2 else values
     return " ".join(f"{value:.{digits}f}" for value in shown)

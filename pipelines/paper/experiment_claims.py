@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,8 +21,8 @@ from pipelines.rows import decode_image
 
 PART = "experiment"
 PLACE = "IV, Experimental results"
-SOLVES = 20  # of each picture, of which the shortest counts
-MOST = 0.9  # share that "most" asks for
+SOLVES = {by_eposit: 5, by_released: 1}  # of each picture, of which the shortest counts; the released may take seconds
+MOST = 0.5  # share that "most" asks for
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,11 +61,15 @@ def timed(dataset: Dataset, pictures: Pictures, detectors: tuple[str, ...]) -> C
     """Single calls on every picture that has the four points, and detection on every picture."""
     images = dataset.read("frames", ["frame_id", "image"]).to_pylist()
     pixels = [decode_image(row["image"], dataset.root, row["frame_id"]) for row in images]
-    detection = {name: _times([lambda p=p, n=name: detect_points(p, pictures.target, n) for p in pixels], 1)
-                 for name in detectors}  # fmt: skip
-    solves = [_times([lambda i=i, s=s: _solve(pictures, i, s) for i in range(len(pixels))], SOLVES)
-              for s in (by_eposit, by_released)]  # fmt: skip
-    return Cost(*solves, detection)
+    detection = {
+        name: _times([functools.partial(detect_points, image, pictures.target, name) for image in pixels], 1)
+        for name in detectors
+    }
+    eposit, released = (
+        _times([functools.partial(_solve, pictures, i, solve) for i in range(len(pixels))], repeats)
+        for solve, repeats in SOLVES.items()
+    )
+    return Cost(eposit, released, detection)
 
 
 def _solve(pictures: Pictures, i: int, solve: Callable[..., object]) -> None:
@@ -133,7 +138,7 @@ def _share(found: Found, way: Way, within: Callable[[Way], Mask]) -> str:
 
 def _verdict(inside: Array, least: float) -> Verdict:
     share = float(np.mean(inside))
-    return Verdict.HOLDS if share >= least else Verdict.PARTLY if share >= 0.5 else Verdict.FAILS
+    return Verdict.HOLDS if share >= least else Verdict.PARTLY if share >= 0.5 * least else Verdict.FAILS
 
 
 def _reprojection(found: Found) -> Claim:
@@ -158,10 +163,10 @@ def _who_is_wrong(found: Found) -> Claim:
         i = number - 1
         calibrated, ours = (way.turn_rad(truth)[i] for way in (found.calibration, found.eposit))
         wrong += bool(not calibrated <= ours) and found.eposit.status[i] == "ok"
-        eposit = f"{ours:.2g}" if found.eposit.status[i] == "ok" else found.eposit.status[i]
+        eposit = f"{ours:.2g} rad" if found.eposit.status[i] == "ok" else found.eposit.status[i]
         told.append(
-            f"{number}th ({kind}): calibration {calibrated:.2g} rad at {found.calibration.used_px[i] / usual:.2g} times "
-            f"its usual reprojection error, EPOSIT {eposit} rad"
+            f"picture {number} ({kind}): calibration {calibrated:.2g} rad at {found.calibration.used_px[i] / usual:.2g} "
+            f"times its usual reprojection error, EPOSIT {eposit}"
         )
     why = (
         f"The truth decides: the calibration's pose is the farther one on {wrong} of 3. A large reprojection error "
@@ -184,9 +189,9 @@ def _at_once(found: Found) -> str:
     )
     rest = _ordinary(found, found.at_once.used_px)
     return (
-        " Where the calibration has not converged it is otherwise: in one call, without finding the poses anew at every "
-        f"step, OpenCV leaves them with {told} rad of true error, and the ordinary ones with {np.nanmedian(rest):.2g} px "
-        "in the median. So may the paper's have been."
+        " A calibration that has not converged is otherwise: in one call, without finding the poses anew at each step, "
+        f"OpenCV leaves the three with a reprojection and a true error of {told}, and the ordinary ones with "
+        f"{np.nanmedian(rest):.2g} px in the median. So may the paper's have been."
     )
 
 

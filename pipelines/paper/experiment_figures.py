@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from eposit.arrays import Array
 from eposit.pose import euler_from_rotation
@@ -48,7 +50,7 @@ def differences_figure(pictures: Pictures, way: Way, calibration: Way) -> str:
             for (label, item, other), mark in zip(shown, MARKS, strict=False):
                 for column, values in enumerate((item.rotation_rad(other), item.shift_mm(other))):
                     axes[i, column].plot(number, values[:, i], mark, markersize=5, fillstyle="none", label=label)
-            axes[i, 0].set(ylabel=f"r{axis}, rad", yscale="symlog")
+                axes[i, 0].set_ylabel(f"r{axis}, rad")
             axes[i, 0].set_yscale("symlog", linthresh=0.1)
             axes[i, 1].set_ylabel(f"{axis}, mm")
             axes[i, 1].set_yscale("symlog", linthresh=50.0)
@@ -69,7 +71,7 @@ def reprojection_figure(pictures: Pictures, ways: Sequence[Way]) -> str:
         return _finished(figure, np.array([[axis]]))
 
 
-def _finished(figure: plt.Figure, axes: Array) -> str:
+def _finished(figure: Figure, axes: Any) -> str:
     for axis in axes.ravel():
         _mark_hard(axis)
     for axis in axes[-1]:
