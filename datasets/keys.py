@@ -53,7 +53,7 @@ def _section_keys(section: type) -> Iterator[Key]:
         default = "required" if field.default is MISSING else toml_value(field.default)
         yield field.name, default, hints[field.name].__metadata__[0]
         for item in _item_types(hints[field.name]):
-            yield from ((f"{field.name}.{key}", *rest) for key, *rest in _section_keys(item))
+            yield from ((f"{field.name}.{key}", given, meaning) for key, given, meaning in _section_keys(item))
 
 
 def _item_types(hint: Any) -> list[type]:

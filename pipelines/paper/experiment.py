@@ -156,10 +156,11 @@ def _summary(found: Found, detector: str) -> Table:
                 _median(way.board_px[ordinary]), *hard,
             )
         )  # fmt: skip
+    fx, fy, cx, cy = found.camera.matrix[[0, 1, 0, 1], [0, 1, 2, 2]]
+    true = pictures.true
     note = (
-        f"f {found.camera.matrix[0, 0]:.2f} and {found.camera.matrix[1, 1]:.2f}, centre "
-        f"{found.camera.matrix[0, 2]:.2f} and {found.camera.matrix[1, 2]:.2f} px by the calibration; the truth is {pictures.true.fx} and "
-        f"{pictures.true.fy}, {pictures.true.cx} and {pictures.true.cy}."
+        f"f {fx:.2f} and {fy:.2f}, centre {cx:.2f} and {cy:.2f} px by the calibration; "
+        f"the truth is {true.fx} and {true.fy}, {true.cx} and {true.cy}."
     )
     if isinstance(found.at_once, str):
         note += f" The calibration in one call ends in an error: {found.at_once}."

@@ -165,8 +165,8 @@ def _who_is_wrong(found: Found) -> Claim:
         wrong += bool(not calibrated <= ours) and found.eposit.status[i] == "ok"
         eposit = f"{ours:.2g} rad" if found.eposit.status[i] == "ok" else found.eposit.status[i]
         told.append(
-            f"picture {number} ({kind}): calibration {calibrated:.2g} rad at {found.calibration.used_px[i] / usual:.2g} "
-            f"times its usual reprojection error, EPOSIT {eposit}"
+            f"picture {number} ({kind}): calibration {calibrated:.2g} rad at "
+            f"{found.calibration.used_px[i] / usual:.2g} times its usual reprojection error, EPOSIT {eposit}"
         )
     why = (
         f"The truth decides: the calibration's pose is the farther one on {wrong} of 3. A large reprojection error "

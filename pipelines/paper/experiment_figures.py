@@ -51,9 +51,7 @@ def differences_figure(pictures: Pictures, way: Way, calibration: Way) -> str:
                 for column, values in enumerate((item.rotation_rad(other), item.shift_mm(other))):
                     axes[i, column].plot(number, values[:, i], mark, markersize=5, fillstyle="none", label=label)
                 axes[i, 0].set_ylabel(f"r{axis}, rad")
-            axes[i, 0].set_yscale("symlog", linthresh=0.1)
             axes[i, 1].set_ylabel(f"{axis}, mm")
-            axes[i, 1].set_yscale("symlog", linthresh=50.0)
             for column, limit in enumerate((LIMIT_RAD, LIMITS_MM[i])):
                 for sign in (-1.0, 1.0):
                     axes[i, column].axhline(sign * limit, color="0.4", linestyle="--", linewidth=0.8)
