@@ -36,7 +36,7 @@ def _merged(sections: list[type]) -> Iterator[Key]:
     seen: set[str] = set()
     for section in sections:
         for key, default, meaning in _section_keys(section):
-            takers = [other for other in sections if key in field_names(other)]
+            takers = [other for other in sections if key.partition(".")[0] in field_names(other)]
             note = "" if len(takers) == len(sections) else f"{', '.join(map(_kind, takers))}: "
             if key not in seen:
                 yield key, default, note + meaning
@@ -52,6 +52,13 @@ def _section_keys(section: type) -> Iterator[Key]:
     for field in fields(section):
         default = "required" if field.default is MISSING else toml_value(field.default)
         yield field.name, default, hints[field.name].__metadata__[0]
+        for item in _item_types(hints[field.name]):
+            yield from ((f"{field.name}.{key}", given, meaning) for key, given, meaning in _section_keys(item))
+
+
+def _item_types(hint: Any) -> list[type]:
+    """The dataclass whose values a list holds, of an annotated type; empty if it holds none."""
+    return [kind for kind in get_args(get_args(hint)[0]) if is_dataclass(kind) and isinstance(kind, type)]
 
 
 def toml_value(value: Any) -> str:
@@ -74,9 +81,19 @@ def values_of(recipe: BaseModel) -> dict[str, str]:
             found[key] = ", ".join(shown)
         elif not tail:
             found[key] = "section" if is_dataclass(value) else toml_value(value)
-        elif tail in field_names(type(value)):  # not a key of another kind of trajectory
-            found[key] = toml_value(getattr(value, tail))
+        elif tail.partition(".")[0] in field_names(type(value)):  # not a key of another kind of trajectory
+            found[key] = _shown(value, tail)
     return found
+
+
+def _shown(section: Any, tail: str) -> str:
+    """A section's value; of a list of tables how many there are, and of a key of theirs each one's."""
+    name, _, inner = tail.partition(".")
+    value = getattr(section, name)
+    if inner:
+        return ", ".join(toml_value(getattr(item, inner)) for item in value)
+    tables = isinstance(value, tuple) and any(map(is_dataclass, value))
+    return f"{len(value)} {name}" if tables else toml_value(value)
 
 
 def field_names(section: type) -> list[str]:
@@ -93,10 +110,10 @@ def sentence(error: ValidationError, model: type[BaseModel]) -> str:
     path = [str(part) for part in parts if not (isinstance(part, str) and part.startswith(("tuple[", "literal[")))]
     key, fault, given = ".".join(path) or "recipe", first["type"], first.get("input")
     if fault in UNKNOWN_KEY:
-        known = field_names(kind) if kind else _keys_beside(path, model)
+        known = field_names(kind) if kind and len(path) == 2 else _keys_beside(path, model)
         close = difflib.get_close_matches(path[-1], known, n=1)
         hint = f" (did you mean {close[0]!r}?)" if close else ""
-        where = f"known keys of kind {_kind(kind)!r} are" if kind else "known keys there are"
+        where = f"known keys of kind {_kind(kind)!r} are" if kind and len(path) == 2 else "known keys there are"
         return f"unknown key {key!r}{hint}; {where} {', '.join(known)}"
     if fault in ("missing", "missing_argument", "missing_keyword_only_argument"):
         return f"key {key!r} is missing; add it"

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
 
 from datasets.errors import UserError
+from datasets.listed import Listed
 from datasets.recipe import CameraSpec, Recipe
 from datasets.scatter import MAX_TRIES, Scatter
 from datasets.trajectory import Helix
-from datasets.views import View, hand_held
+from datasets.views import FieldAngles, View, hand_held
 from eposit import Pose
 from render.motion import Rate
+from render.regimes import SensorModel
 
 
 class Stream(IntEnum):
@@ -38,6 +40,7 @@ class Frame:
     camera: CameraSpec
     cam_from_obj: Pose
     rate: Rate  # of the pose
+    sensor: SensorModel
     render_seed: int  # 32 bits
     sensor_seed: int  # 63 bits
 
@@ -61,8 +64,9 @@ def plan(recipe: Recipe) -> tuple[Frame, ...]:
             frame_id = len(frames)
             render_seed = int(rng_for(recipe.seed, Stream.RENDER, frame_id).integers(2**32))
             sensor_seed = int(rng_for(recipe.seed, Stream.SENSOR, frame_id).integers(2**63))
+            pose, sensor = view.cam_from_obj, _sensor(recipe, view)
             frames.append(
-                Frame(frame_id, pose_id, view.time_s, camera, view.cam_from_obj, view.rate, render_seed, sensor_seed)
+                Frame(frame_id, pose_id, view.time_s, camera, pose, view.rate, sensor, render_seed, sensor_seed)
             )
     for frame in frames:
         fault = _fault(frame.camera, frame.cam_from_obj, recipe)
@@ -93,10 +97,24 @@ def _views(recipe: Recipe) -> Iterator[View]:
         for time_s in path.times():
             yield path.view(float(time_s), target)
         return
-    poses = _scattered(path, recipe) if isinstance(path, Scatter) else path.poses(target)
-    for pose_id, pose in enumerate(poses):
+    for pose_id, (pose, defocus) in enumerate(_stands(path, recipe)):
         rng = rng_for(recipe.seed, Stream.HAND, pose_id)
-        yield View(float(pose_id), pose, hand_held(pose, target, path.speed_mm_per_s, path.turn_deg_per_s, rng))
+        rate = hand_held(pose, target, path.speed_mm_per_s, path.turn_deg_per_s, rng)
+        yield View(float(pose_id), pose, rate, defocus)
+
+
+def _stands(path: FieldAngles | Scatter | Listed, recipe: Recipe) -> Iterable[tuple[Pose, float | None]]:
+    """Poses, each with its own radius of defocus, px, if it has one."""
+    if isinstance(path, Listed):
+        return path.stands(recipe.target)
+    poses = _scattered(path, recipe) if isinstance(path, Scatter) else path.poses(recipe.target)
+    return ((pose, None) for pose in poses)
+
+
+def _sensor(recipe: Recipe, view: View) -> SensorModel:
+    if view.defocus_radius_px is None:
+        return recipe.sensor
+    return replace(recipe.sensor, defocus_radius_px=view.defocus_radius_px)
 
 
 def _scattered(path: Scatter, recipe: Recipe) -> Iterator[Pose]:

@@ -29,7 +29,7 @@ class Scatter:
         ValueError: a value out of range.
     """
 
-    kind: Annotated[Literal["scatter"], "helix, field or scatter"] = "scatter"
+    kind: Annotated[Literal["scatter"], "helix, field, scatter or listed"] = "scatter"
     count: Annotated[int, "number of poses"] = 40
     depth_range_mm: Annotated[Range, "least and largest depth of the board's centre, mm"] = (2000.0, 2000.0)
     offset_range_mm: Annotated[

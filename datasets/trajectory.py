@@ -1,4 +1,4 @@
-"""Where the target stands in front of the camera: the paper's helix, chosen field angles, or scattered poses."""
+"""Where the target stands in front of the camera: the paper's helix, chosen field angles, scattered or listed poses."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
+from datasets.listed import Listed
 from datasets.scatter import Scatter
 from datasets.views import FieldAngles, View
 from eposit import Pose
@@ -31,7 +32,7 @@ class Helix:
         Paper, section III. The start angles and the range of t are not in its text; they are inferred from its code.
     """
 
-    kind: Annotated[Literal["helix"], "helix, field or scatter"] = "helix"
+    kind: Annotated[Literal["helix"], "helix, field, scatter or listed"] = "helix"
     point: Annotated[
         Literal["board_centre", "origin"] | tuple[float, float, float],
         "point of the target that the helix carries: board_centre, origin, or [x, y, z] in mm",
@@ -79,5 +80,10 @@ class Helix:
         return np.zeros(3) if self.point == "origin" else np.array(self.point)
 
 
-Trajectory = Helix | FieldAngles | Scatter
-TRAJECTORIES: dict[str, type[Trajectory]] = {"helix": Helix, "field": FieldAngles, "scatter": Scatter}
+Trajectory = Helix | FieldAngles | Scatter | Listed
+TRAJECTORIES: dict[str, type[Trajectory]] = {
+    "helix": Helix,
+    "field": FieldAngles,
+    "scatter": Scatter,
+    "listed": Listed,
+}

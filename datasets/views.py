@@ -25,6 +25,7 @@ class View:
     time_s: float  # on the trajectory; the pose's number where that has no time
     cam_from_obj: Pose
     rate: Rate
+    defocus_radius_px: float | None = None  # of its pictures; None: the sensor's
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,7 +39,7 @@ class FieldAngles:
         ValueError: an empty list, or a value out of range.
     """
 
-    kind: Annotated[Literal["field"], "helix, field or scatter"] = "field"
+    kind: Annotated[Literal["field"], "helix, field, scatter or listed"] = "field"
     field_deg: Annotated[tuple[float, ...], "angles of the board's centre from the optical axis, degrees"] = (0.0,)
     distance_mm: Annotated[tuple[float, ...], "distances of the board's centre from the camera centre, mm"] = (1500.0,)
     azimuth_deg: Annotated[

@@ -79,7 +79,7 @@ def _finish(dataset: Dataset, frame: Frame, master: Master, is_new: bool) -> dic
         except OSError as error:
             raise refused(dataset.root / relative, error) from error
     shot = Shot(recipe.target, camera, frame.cam_from_obj, frame.rate, master.region, frame.sensor_seed)
-    image = develop(master.full(camera), recipe.sensor, shot)
+    image = develop(master.full(camera), frame.sensor, shot)
     coefficients = np.zeros(4)
     coefficients[: len(spec.coefficients)] = spec.coefficients
     region = dict(

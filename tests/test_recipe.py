@@ -65,7 +65,7 @@ def test_every_key_is_described_and_shown():
     assert all(meaning for _, _, meaning in describe())
     recipe, _ = load_recipe("demo")
     assert set(values(recipe)) == {
-        key for key, _, meaning in describe() if not meaning.startswith(("field", "scatter"))
+        key for key, _, meaning in describe() if not meaning.startswith(("field", "scatter", "listed"))
     }
     assert values(recipe)["trajectory.step"] == "45.0"
 

@@ -45,7 +45,7 @@ def image_of(recipe: Recipe, frame: Frame, master: Master | None = None) -> NDAr
     camera = frame.camera.true_camera()
     light = master_of(recipe, frame) if master is None else master
     shot = Shot(recipe.target, camera, frame.cam_from_obj, frame.rate, light.region, frame.sensor_seed)
-    return develop(light.full(camera), recipe.sensor, shot)
+    return develop(light.full(camera), frame.sensor, shot)
 
 
 def over_background(recipe: Recipe, camera: Camera, film: Image, region: Region) -> Master:

@@ -70,9 +70,9 @@ def _frame(recipe: Recipe, camera: str) -> None:
         frame = next(frame for frame in plan(recipe) if frame.camera.name == camera)
         master = master_of(recipe, frame)
         write_master(master, frame.camera.true_camera(), Path(folder) / "master.exr")
-        encode_png(develop(master.full(frame.camera.true_camera()), recipe.sensor))
+        encode_png(develop(master.full(frame.camera.true_camera()), frame.sensor))
 
 
 def _image(recipe: Recipe, camera: str) -> np.ndarray:
     frame = next(frame for frame in plan(recipe) if frame.camera.name == camera)
-    return develop(master_of(recipe, frame).full(frame.camera.true_camera()), recipe.sensor)
+    return develop(master_of(recipe, frame).full(frame.camera.true_camera()), frame.sensor)
