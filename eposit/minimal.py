@@ -175,6 +175,6 @@ def choose(
     camera = images.camera
     estimated = Division(f, k, camera.cx, camera.cy, camera.fy / camera.fx)
     pose, spread = Pose(R, np.where(ok[:, None], t, np.nan)), np.full((len(b), 6, 6), np.nan)
-    steps = np.where(ok, steps, 0)
-    estimate = Estimate(status, pose, steps, rmse, spread, camera=estimated, candidates=found)
+    taken = np.where(ok, steps, 0)
+    estimate = Estimate(status, pose, taken, rmse, spread, camera=estimated, candidates=found)
     return estimate.first() if images.single else estimate
