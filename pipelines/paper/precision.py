@@ -1,0 +1,206 @@
+"""Section III-A and III-B of the paper: precision for five lenses, and stability to the principal point."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from eposit.arrays import Array
+from eposit.pose import euler_from_rotation
+from pipelines.intervals import Interval, bootstrap, mean
+from pipelines.paper import simulation as sim
+from pipelines.paper.parts import Claim, Drawing, Section, Table, Verdict
+from pipelines.paper.plots import boxes, curves
+from pipelines.paper.problems import OBJECT, helix
+
+WAYS = {"equations": sim.equations_from_principal_point, "released": sim.as_released_from_principal_point}
+CENTRE_WAYS = {"equations": sim.equations, "released": sim.as_released}
+HEAD = ("camera", "way", *(f"{name}, {unit}" for name, unit in zip(sim.COMPONENTS, sim.UNITS, strict=True)))
+
+
+def precision(seeds: int) -> Section:
+    """Mean errors of EPOSIT through five lenses, by the equations and as released."""
+    found = {
+        (way, lens): sim.outcome(sim.draws(lens, seeds), call).error
+        for way, call in WAYS.items()
+        for lens in sim.LENSES
+    }
+    rows = [(lens, way, *(_mean(error[..., k]).text(3) for k in range(6))) for (way, lens), error in found.items()]
+    first = {lens: found["released", lens][0] for lens in sim.LENSES}
+    path = helix()
+    truth = np.hstack((np.degrees(euler_from_rotation(path.R)), path.t))
+    items = (
+        Drawing(
+            "The paper's figure 3: truth and estimates, as released, first draw",
+            curves(np.arange(len(truth)), truth, {lens: truth + error for lens, error in first.items()}),
+        ),
+        Drawing(
+            "The paper's figure 4: errors, as released, all draws; dashed: the mean of 50 mm that its text states",
+            boxes({lens: found["released", lens].reshape(-1, 6) for lens in sim.LENSES}, {5: [-50.0]}),
+        ),
+        Table(
+            f"Mean errors over 361 poses and {seeds} draws of noise, with 95 % intervals over the draws",
+            HEAD,
+            tuple(rows),
+            "Nominal focal length; x, y and theta from the true principal point: read so, the released behaviour gives "
+            "the paper's numbers. Estimate minus truth, so that a short focal length gives depths that are too small.",
+        ),
+    )
+    intro = (
+        "Four points, 0.4 px of noise, nominal focal lengths of 541 px (true: 552.39, 552.69) and 1353 px (true: "
+        "1378.65, 1381.37)."
+    )
+    return Section("Precision for five lenses (III-A)", intro, items, _precision_claims(found))
+
+
+def _precision_claims(found: dict[tuple[str, str], Array]) -> tuple[Claim, ...]:
+    means = {key: np.nanmean(error, axis=(0, 1)) for key, error in found.items()}
+
+    def largest(way: str, part: slice) -> float:
+        return float(max(np.abs(means[way, lens][part]).max() for lens in sim.LENSES))
+
+    def apart(way: str, part: slice) -> float:
+        pairs = itertools.combinations(sim.FISHEYES, 2)
+        return float(max(np.abs(means[way, a][part] - means[way, b][part]).max() for a, b in pairs))
+
+    def z(way: str) -> str:
+        pinhole = _mean(found[way, "perspective"][..., 5]).text(3)
+        fisheye = _mean(np.stack([found[way, lens][..., 5] for lens in sim.FISHEYES], axis=-1)).text(3)
+        return f"fish-eyes {fisheye} mm, pinhole {pinhole} mm"
+
+    def each(part: slice, unit: str, measure: object = largest) -> tuple[str, str]:
+        call = apart if measure is apart else largest
+        return f"{call('equations', part):.2g} {unit}", f"{call('released', part):.2g} {unit}"
+
+    rotation, place, depth = slice(0, 3), slice(3, 5), slice(5, 6)
+    std = float(np.nanstd(found["equations", "orthogonal"][..., 0]))
+    agree = [apart("released", part) for part in (rotation, place, depth)]
+    return (
+        Claim(
+            "III-A", "Mean rotation errors are nearly zero for every camera", "about 0", *each(rotation, "deg at most"),
+            Verdict.HOLDS,
+            f"The scatter of one pose (orthogonal, rx: {std:.2g} deg) is ten times larger; the wrong focal length "
+            "hardly turns the pose.", "precision",
+        ),
+        Claim(
+            "III-A", "Mean errors in x and y are nearly zero for every camera", "about 0", *each(place, "mm at most"),
+            Verdict.HOLDS, "With the true principal point subtracted. Where the image centre is subtracted as well "
+            "(a user without calibration) they are -65 and +51 mm: see the sensitivity table.", "precision",
+        ),
+        Claim(
+            "III-A", "The mean error in z is about 50 mm", "50 mm", z("equations"), z("released"), Verdict.HOLDS,
+            "It is the focal length: 541 for 552.5 px is 2.1 % of 2045 mm. With the true camera it is -1.1 mm "
+            "(fish-eye). The pinhole's is nearer to 40.", "precision",
+        ),
+        Claim(
+            "III-A", "50 mm is acceptable because the smallest true depth is 2000 mm", "2.5 %",
+            *(f"{100 * abs(means[way, 'orthogonal'][5]) / 2045.0:.2g} % of the mean depth" for way in WAYS),
+            Verdict.HOLDS, "As arithmetic. It is a bias that a calibrated focal length removes.", "precision",
+        ),
+        Claim(
+            "III-A", "Mean rotations of the four fish-eyes differ by at most 0.01 degrees", "0.01 deg",
+            *each(rotation, "deg", apart), Verdict.HOLDS if agree[0] <= 0.015 else Verdict.PARTLY,
+            "The noise is shared by the four lenses; with draws of their own the means of one run differ by the "
+            "scatter of a mean of 361 poses, 0.07 deg.", "precision",
+        ),
+        Claim(
+            "III-A", "Their mean x and y differ by at most 0.02 mm", "0.02 mm", *each(place, "mm", apart),
+            Verdict.HOLDS if agree[1] <= 0.02 else Verdict.PARTLY, "Shared noise, as above.", "precision",
+        ),
+        Claim(
+            "III-A", "Their mean z differ by at most 6 mm", "6 mm", *each(depth, "mm", apart),
+            Verdict.HOLDS if 3.0 <= agree[2] <= 6.5 else Verdict.PARTLY,
+            "Only the released behaviour spreads them: it applies G of M0 twice. By the equations they agree to a "
+            "fraction of a millimetre, because the object is near the axis.", "precision",
+        ),
+    )  # fmt: skip
+
+
+def principal_point(seeds: int) -> Section:
+    """Differences between theta from the principal point and theta from the image centre."""
+    rows: list[tuple[str, ...]] = []
+    differences: dict[tuple[str, str], Array] = {}
+    for way in WAYS:
+        for lens in sim.LENSES:
+            problem = sim.draws(lens, seeds)
+            pair = [sim.outcome(problem, calls[way]).error for calls in (WAYS, CENTRE_WAYS)]
+            differences[way, lens] = pair[1] - pair[0]
+            rows.append((lens, way, *(_mean(differences[way, lens][..., k]).text(3) for k in range(6))))
+    shown = {lens: differences["released", lens].reshape(-1, 6) for lens in sim.LENSES}
+    items = (
+        Drawing(
+            "The paper's figure 5: differences, as released; dashed: its bounds of 0.3 degrees and 1.9 mm",
+            boxes(shown, dict.fromkeys(range(3), [-0.3, 0.3]) | dict.fromkeys(range(3, 6), [-1.9, 1.9])),
+        ),
+        Table("Mean differences, with 95 % intervals over the draws", HEAD, tuple(rows)),
+    )
+    intro = "Theta measured from the image centre, (800, 600), against theta from the true principal point."
+    return Section("Stability to the principal point (III-B)", intro, items, _principal_claims(differences))
+
+
+def _principal_claims(differences: dict[tuple[str, str], Array]) -> tuple[Claim, ...]:
+    means = {key: np.abs(np.nanmean(value, axis=(0, 1))) for key, value in differences.items()}
+
+    def worst(way: str, part: slice, lenses: tuple[str, ...] = sim.LENSES) -> float:
+        return float(max(means[way, lens][part].max() for lens in lenses))
+
+    def both(part: slice, unit: str) -> tuple[str, str]:
+        return f"{worst('equations', part):.2g} {unit}", f"{worst('released', part):.2g} {unit}"
+
+    rotation, place, depth = slice(0, 3), slice(3, 5), slice(5, 6)
+    x, y = 100.0 * np.sqrt(2.0), float(np.abs(helix().t[:, :2]).min())
+    pinhole = [f"{worst(way, rotation, ('perspective',)):.2g} deg" for way in WAYS]
+    return (
+        Claim(
+            "III-B", "Differences are smaller for the pinhole camera", "0 for the pinhole", *pinhole,
+            Verdict.HOLDS, "G is 1 for the pinhole, whatever theta is: the differences are exactly zero.",
+            "principal-point",
+        ),
+        Claim(
+            "III-B", "The largest mean difference of rotation is below 0.3 degrees", "0.3 deg",
+            *both(rotation, "deg"), Verdict.HOLDS if worst("released", rotation) < 0.3 else Verdict.FAILS, "",
+            "principal-point",
+        ),
+        Claim(
+            "III-B", "The largest difference of translation is below 1.9 mm", "1.9 mm",
+            *(f"x, y {worst(way, place):.2g} mm, z {worst(way, depth):.2g} mm" for way in WAYS),
+            Verdict.HOLDS if worst("released", depth) < 1.9 else Verdict.PARTLY,
+            "It holds in x and y. In z the mean difference is larger, under the equations as under the released code.",
+            "principal-point",
+        ),
+        Claim(
+            "III-B", "1.9 mm is acceptable beside the smallest true value of 100 mm", "100 mm",
+            f"smallest |x| or |y| on the helix: {y:.2g} mm", "the same", Verdict.FAILS,
+            f"A slip: x and y run from -{x:.0f} to {x:.0f} mm and pass through zero; 100 mm is their value at t = 0.",
+            "principal-point",
+        ),
+        Claim(
+            "III-B", "The principal point can be substituted by the image centre", "-",
+            "inside theta: yes, see above; everywhere: x, y off by -65 and +51 mm", "the same", Verdict.PARTLY,
+            "The figures need the true principal point subtracted from x and y: only theta takes the centre.",
+            "sensitivity",
+        ),
+        Claim(
+            "II-B", "G of M0 and of Pi may be taken as equal where |M0 Mi| is at most 0.1 Z0", "equal",
+            f"they differ by up to {100 * _ratio_apart(0.0):.2g} % on the helix, {100 * _ratio_apart(40.0):.2g} % at 40 "
+            "degrees", "not used", Verdict.PARTLY,
+            "Equations 21 and 22 do not use it: with exact theta each point has its own G, and EPOSIT is POSIT on "
+            "rectified points. The object reaches exactly 0.1 Z0 at t = 0.", "principal-point",
+        ),
+    )  # fmt: skip
+
+
+def _ratio_apart(turn_deg: float) -> float:
+    """Largest relative difference of G = cos theta (orthogonal) between M0 and Pi, its neighbour at the same depth."""
+    path = helix()
+    turn = np.deg2rad(turn_deg)
+    start = path.t @ np.array([[np.cos(turn), 0.0, -np.sin(turn)], [0.0, 1.0, 0.0], [np.sin(turn), 0.0, np.cos(turn)]])
+    beside = start[:, None] + np.einsum("bij,nj->bni", path.R, OBJECT[1:]) * np.array([1.0, 1.0, 0.0])
+    cosine = [part[..., 2] / np.linalg.norm(part, axis=-1) for part in (start[:, None], beside)]
+    return float(np.abs(cosine[1] / cosine[0] - 1.0).max())
+
+
+def _mean(values: Array) -> Interval:
+    """Mean over seeds and poses, with the interval over seeds. values: (seeds, poses, ...)."""
+    return bootstrap(values.reshape(len(values), -1), mean)
