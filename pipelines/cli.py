@@ -27,6 +27,7 @@ COMMANDS: tuple[tuple[Callable[..., None], str], ...] = (
     (tools.verify, "verify out/demo"),
     (tools.doctor, "doctor"),
     (tools.bench, "bench demo --only render --only solver --out bench.md"),
+    (tools.paper, "paper --points-only --out out/paper"),
     (tools.recipes, "recipes"),
     (tools.describe, "describe demo"),
 )

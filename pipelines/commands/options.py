@@ -62,3 +62,15 @@ Memory = Annotated[
     int | None, typer.Option(min=1, help="Instead, generate and detect so many frames and tell the memory.")
 ]
 Markdown = Annotated[Path | None, typer.Option("--out", help="Write the table as Markdown, too.")]
+
+PaperOut = Annotated[Path, typer.Option("--out", help="Folder of paper.html, claims.md and the pictures.")]
+PaperParts = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--only",
+        help="A part: precision, principal-point, pinhole, fisheye, sensitivity, beyond, images or experiment; may be "
+        "given again.",
+    ),
+]
+Seeds = Annotated[int, typer.Option(help="Draws of noise on every pose of the helix.")]
+PointsOnly = Annotated[bool, typer.Option("--points-only", help="Leave out what renders: images and experiment.")]

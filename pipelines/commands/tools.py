@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import typer
 from rich.console import Console
 from rich.markup import escape
@@ -48,6 +50,20 @@ def bench(
     from pipelines.bench.command import bench as measure
 
     measure(load(recipe, regime)[0], poses, only or [], memory, out)
+
+
+def paper(
+    out: o.PaperOut = Path("out/paper"),
+    only: o.PaperParts = None,
+    seeds: o.Seeds = 20,
+    points_only: o.PointsOnly = False,
+    workers: o.Workers = 1,
+) -> None:
+    """The EPOSIT paper, reproduced claim by claim, and what goes beyond it."""
+    from pipelines.paper.command import reproduce
+
+    for path in reproduce(out, only or [], seeds, points_only, workers):
+        typer.echo(path)
 
 
 def recipes() -> None:

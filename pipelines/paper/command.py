@@ -1,0 +1,132 @@
+"""`paper`: measure the chosen parts, then write `paper.html` and `claims.md`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import jinja2
+from rich.console import Console
+from rich.progress import Progress
+from threadpoolctl import threadpool_limits
+
+from datasets.errors import UserError
+from datasets.store import refused
+from pipelines.doctor import versions
+from pipelines.engine import check_workers
+from pipelines.paper.parts import Claim, Drawing, Section
+from render.files import replace_atomically
+
+PAGE, CLAIMS = "paper.html", "claims.md"
+IMAGE_PARTS = ("images", "experiment")
+Measure = Callable[[], Sequence[Section]]
+MAX_SEEDS = 1000
+
+
+def parts(out: Path, seeds: int, workers: int, tell: Callable[[str], None]) -> dict[str, Measure]:
+    """The parts by name, in the order of the page."""
+    from pipelines.paper import comparison, precision, sensitivity
+    from pipelines.paper.beyond import beyond
+    from pipelines.paper.experiment import measure as experiment
+    from pipelines.paper.images import images
+
+    return {
+        "precision": lambda: [precision.precision(seeds)],
+        "principal-point": lambda: [precision.principal_point(seeds)],
+        "pinhole": lambda: [comparison.pinhole(seeds)],
+        "fisheye": lambda: [comparison.fisheye(seeds)],
+        "sensitivity": lambda: [sensitivity.sensitivity(max(1, seeds // 4))],
+        "beyond": beyond,
+        "images": lambda: [images(out / "images", workers, tell)],
+        "experiment": lambda: [experiment(out / "experiment", tell)],
+    }
+
+
+def reproduce(out: Path, only: Sequence[str], seeds: int, points_only: bool, workers: int) -> tuple[Path, Path]:
+    """Measure and write; the two files.
+
+    only: names of parts, all if empty. points_only: leave out what renders.
+
+    Raises:
+        UserError: an unknown part, a number out of range, or a folder that cannot be written.
+    """
+    if not 1 <= seeds <= MAX_SEEDS:
+        raise UserError(f"{seeds} draws of noise are not usable; give --seeds from 1 to {MAX_SEEDS}")
+    check_workers(workers)
+    console, sections, claims = Console(), list[Section](), list[Claim]()
+    # The batches are of small matrices, which threads only slow down.
+    with Progress(console=console) as progress, threadpool_limits(1):
+        bar = progress.add_task("")
+        known = parts(out, seeds, workers, lambda text: progress.update(bar, description=text))
+        for name in only:
+            if name not in known:
+                raise UserError(f"unknown part {name!r}; choose one of {', '.join(known)}")
+        chosen = [name for name in known if (not only or name in only) and not (points_only and name in IMAGE_PARTS)]
+        if not chosen:
+            raise UserError(f"--points-only leaves out {', '.join(only)}; drop one of the two options")
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise refused(out, error) from error
+        progress.update(bar, total=len(chosen))
+        for name in chosen:
+            progress.update(bar, description=name)
+            for section in known[name]():
+                sections.append(section)
+                claims += section.claims
+            progress.advance(bar)
+    return write(out, sections, claims, seeds)
+
+
+def write(out: Path, sections: Sequence[Section], claims: Sequence[Claim], seeds: int) -> tuple[Path, Path]:
+    """`paper.html` and `claims.md` in a folder.
+
+    Raises:
+        UserError: the disk refuses.
+    """
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent), autoescape=True, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.tests["drawing"] = lambda item: isinstance(item, Drawing)
+    html = environment.get_template("page.html").render(
+        sections=sections, claims=claims, versions=versions(), seeds=seeds
+    )
+    found = out / PAGE, out / CLAIMS
+    for path, text in zip(found, (html, markdown(claims)), strict=True):
+        try:
+            with replace_atomically(path) as temporary:
+                temporary.write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise refused(path, error) from error
+    return found
+
+
+def markdown(claims: Sequence[Claim]) -> str:
+    """The claims as a table."""
+    head = (
+        "no.",
+        "section",
+        "the paper says",
+        "its number",
+        "by its equations",
+        "as released",
+        "verdict",
+        "why",
+        "command",
+    )
+    lines = [
+        "# The paper's claims",
+        "",
+        "Kang et al., EPOSIT. Each claim in our words, its number, and what we measure by the paper's equations and by "
+        "the behaviour of its released code; in brackets 95 % intervals. Errors are estimate minus truth.",
+        "",
+        f"| {' | '.join(head)} |",
+        f"|{'---|' * len(head)}",
+    ]
+    for number, claim in enumerate(claims, start=1):
+        cells = (
+            str(number), claim.section, claim.text, claim.paper, claim.equations, claim.released, str(claim.verdict),
+            claim.why, f"`python -m pipelines paper --only {claim.part}`",
+        )  # fmt: skip
+        lines.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
+    return "\n".join([*lines, ""])
