@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -41,15 +42,18 @@ def bootstrap(
     Source:
         Efron and Tibshirani 1993, An Introduction to the Bootstrap, section 13.3.
     """
-    units = np.asarray(values, np.float64).reshape(len(values), -1)
-    if not len(units) or np.all(np.isnan(units)):
+    units = np.asarray(values, np.float64)
+    if not units.size or np.all(np.isnan(units)):
         return Interval(np.nan, np.nan, np.nan)
+    units = units.reshape(len(units), -1)
     value = float(statistic(units.reshape(1, -1))[0])
     rng, found = np.random.default_rng(seed), list[Array]()
     chunk = max(1, CHUNK_VALUES // units.size)
     for begin in range(0, resamples, chunk):
         drawn = rng.integers(len(units), size=(min(chunk, resamples - begin), len(units)))
-        found.append(statistic(units[drawn].reshape(len(drawn), -1)))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # a draw of failures only has no score
+            found.append(statistic(units[drawn].reshape(len(drawn), -1)))
     low, high = np.nanquantile(np.concatenate(found), [(1.0 - LEVEL) / 2.0, (1.0 + LEVEL) / 2.0])
     return Interval(value, float(low), float(high))
 
