@@ -68,9 +68,9 @@ PaperParts = Annotated[
     list[str] | None,
     typer.Option(
         "--only",
-        help="A part: precision, principal-point, pinhole, fisheye, sensitivity, beyond, images or experiment; may be "
-        "given again.",
+        help="A part: precision, principal-point, pinhole, fisheye, sensitivity, beyond, images, wide or experiment; "
+        "may be given again.",
     ),
 ]
 Seeds = Annotated[int, typer.Option(help="Draws of noise on every pose of the helix.")]
-PointsOnly = Annotated[bool, typer.Option("--points-only", help="Leave out what renders: images and experiment.")]
+PointsOnly = Annotated[bool, typer.Option("--points-only", help="Leave out what renders: images, wide, experiment.")]

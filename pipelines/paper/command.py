@@ -18,7 +18,7 @@ from pipelines.paper.parts import Claim, Drawing, Section
 from render.files import replace_atomically
 
 PAGE, CLAIMS = "paper.html", "claims.md"
-IMAGE_PARTS = ("images", "experiment")
+IMAGE_PARTS = ("images", "wide", "experiment")
 Measure = Callable[[], Sequence[Section]]
 MAX_SEEDS = 1000
 
@@ -28,7 +28,7 @@ def parts(out: Path, seeds: int, workers: int, tell: Callable[[str], None]) -> d
     from pipelines.paper import comparison, precision, sensitivity
     from pipelines.paper.beyond import beyond
     from pipelines.paper.experiment import measure as experiment
-    from pipelines.paper.images import images
+    from pipelines.paper.images import images, wide
 
     return {
         "precision": lambda: [precision.precision(seeds)],
@@ -38,6 +38,7 @@ def parts(out: Path, seeds: int, workers: int, tell: Callable[[str], None]) -> d
         "sensitivity": lambda: [sensitivity.sensitivity(max(1, seeds // 4))],
         "beyond": beyond,
         "images": lambda: [images(out / "images", workers, tell)],
+        "wide": lambda: [wide(out / "wide", workers, tell)],
         "experiment": lambda: [experiment(out / "experiment", tell)],
     }
 

@@ -14,6 +14,7 @@ from datasets.store import Dataset, claim
 from eposit.arrays import Array
 from pipelines.estimate import Setting
 from pipelines.intervals import bootstrap, mean, median
+from pipelines.paper.field_images import field_of_images
 from pipelines.paper.parts import Section, Table
 from pipelines.paper.simulation import COMPONENTS, LENSES, UNITS
 from pipelines.stages import run_detect, run_estimate, run_generate, run_score
@@ -42,17 +43,10 @@ def images(folder: Path, workers: int, tell: Callable[[str], None]) -> Section:
     Raises:
         UserError: the folder holds something else, or the disk refuses.
     """
-    recipe, text = load_recipe(RECIPE)
-    claim(folder, recipe, text)
-    dataset, console = Dataset(folder, recipe), Console(quiet=True)
-    for stage, call in (
-        ("rendering", lambda: run_generate(dataset, workers, console)),
-        ("detection", lambda: run_detect(dataset, workers, console)),
-        ("estimates", lambda: run_estimate(dataset, SETTINGS, workers, console)),
-        ("scores", lambda: run_score(dataset, workers, console)),
-    ):
-        tell(f"images: {stage}")
-        call()
+    dataset, console = pictures(RECIPE, folder, workers, tell), Console(quiet=True)
+    tell("images: estimates")
+    run_estimate(dataset, SETTINGS, workers, console)
+    run_score(dataset, workers, console)
     scores, cameras = dataset.read("scores"), dataset.read("frames", ["frame_id", "camera_name"])
     tables = tuple(
         _table(scores, cameras, title, take) for title, take in (("Mean errors", _mean), ("Medians", _median))
@@ -63,6 +57,28 @@ def images(folder: Path, workers: int, tell: Callable[[str], None]) -> Section:
         "is the bias of the assumed camera."
     )
     return Section("On rendered pictures", intro, tables)
+
+
+def wide(folder: Path, workers: int, tell: Callable[[str], None]) -> Section:
+    """Success against field angle on the pictures of the recipe `wide`.
+
+    Raises:
+        UserError: the folder holds something else, or the disk refuses.
+    """
+    pictures("wide", folder, workers, tell)
+    tell("wide: poses")
+    return field_of_images(folder)
+
+
+def pictures(name: str, folder: Path, workers: int, tell: Callable[[str], None]) -> Dataset:
+    """The dataset of a recipe that comes along, rendered and detected; what is there is kept."""
+    recipe, text = load_recipe(name)
+    dataset, console = claim(folder, recipe, text), Console(quiet=True)
+    tell(f"{name}: rendering")
+    run_generate(dataset, workers, console)
+    tell(f"{name}: detection")
+    run_detect(dataset, workers, console)
+    return dataset
 
 
 def _table(scores: pa.Table, cameras: pa.Table, title: str, cell: Callable[[Array], str]) -> Table:
