@@ -1,7 +1,6 @@
 """Poses per second of every solver, one call at a time and in a batch, against PoseLib's p3p in a loop.
 
-All run on the draws of the paper's simulation: four points, 0.4 px of noise, the pinhole camera. The solvers use no
-threads of their own; the linear algebra under NumPy may: set OPENBLAS_NUM_THREADS=1 for figures of one core.
+All run on the draws of the paper's simulation: four points, 0.4 px of noise, the pinhole camera; on one thread.
 """
 
 from __future__ import annotations
@@ -12,14 +11,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 import eposit
 from datasets.recipe import Recipe
-from eposit import Camera, Pose, released
+from eposit import Camera, Pose, gpnpf, opnp, pnpfr, released
 from eposit.arrays import Array
 from eposit.pose import rotation_from_euler
 from pipelines.bench.rows import Row, compared
 from pipelines.bench.timing import Times, in_turn
+from pipelines.solvers.names import find_solver
 
 PART = "solver"
 POINTS = np.array([(0.0, 0.0, 0.0), (200.0, 0.0, 0.0), (0.0, 200.0, 0.0), (0.0, 0.0, -50.0)])  # mm, the paper's object
@@ -46,7 +47,15 @@ class Solver:
 def solvers() -> list[Solver]:
     """The solvers measured: a new one is a line here."""
     methods = [Solver(f"solve {name}", functools.partial(eposit.solve, method=name)) for name in eposit.METHODS]
-    return [*methods, Solver("released", released.solve)]
+    others = ("opencv-sqpnp", "opencv-epnp", "opencv-p3p", "poselib-p3p", "poselib-p4pf")  # one image after the other
+    return [
+        *methods,
+        Solver("released", released.solve),
+        Solver("gpnpf", gpnpf.solve, 2000),
+        Solver("pnpfr", pnpfr.solve, 2000),
+        Solver("opnp", opnp.solve, 200),
+        *(Solver(name, find_solver(name), 0) for name in others),
+    ]
 
 
 def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
@@ -54,12 +63,13 @@ def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
     del recipe, poses
     pixels = draws(BATCH)
     loops = {f"PoseLib {name}, in a loop": call for name, call in _poselib(pixels[:LOOPED]).items()}
-    for solver in solvers():
-        single = functools.partial(_each_alone, solver, pixels[:SINGLE])
-        yield from _rows(f"{solver.name}, 4 points, single call, a pose", single, SINGLE, loops)
-        if solver.batch:
-            batch = functools.partial(solver.call, POINTS, pixels[: solver.batch], CAMERA)
-            yield from _rows(f"{solver.name}, 4 points, batch of {solver.batch}, a pose", batch, solver.batch, loops)
+    with threadpool_limits(1):
+        for solver in solvers():
+            single = functools.partial(_each_alone, solver, pixels[:SINGLE])
+            yield from _rows(f"{solver.name}, 4 points, single call, a pose", single, SINGLE, loops)
+            if solver.batch:
+                batch, name = functools.partial(solver.call, POINTS, pixels[: solver.batch], CAMERA), solver.name
+                yield from _rows(f"{name}, 4 points, batch of {solver.batch}, a pose", batch, solver.batch, loops)
 
 
 def draws(count: int) -> Array:
