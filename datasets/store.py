@@ -224,6 +224,19 @@ def unreadable(path: Path) -> UserError:
     return UserError(f"cannot read {path}: this user has no permission; ask its owner for it")
 
 
+def write_text(path: Path, text: str) -> None:
+    """Write a file that is never half there.
+
+    Raises:
+        UserError: the disk refuses.
+    """
+    try:
+        with replace_atomically(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise refused(path, error) from error
+
+
 def refused(path: Path, error: OSError) -> UserError:
     """What the operating system refused, as a sentence."""
     if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):

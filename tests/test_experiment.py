@@ -15,6 +15,7 @@ from pipelines.paper.experiment import compare, section
 from pipelines.paper.experiment_claims import Cost
 from pipelines.paper.parts import Drawing, Table
 from pipelines.paper.pictures import HARD, Pictures, by_eposit, estimated
+from tests.test_trajectory import BASE
 
 
 @pytest.fixture(scope="module")
@@ -90,18 +91,8 @@ def test_the_section_has_every_picture_and_claim(found):
     assert all(claim.part == "experiment" and claim.why for claim in made.claims)
 
 
-LISTED = """\
-name = "x"
-[[cameras]]
-name = "a"
-lens = "equisolid"
-fx = 276.0
-fy = 276.0
-cx = 399.5
-cy = 299.5
-width = 800
-height = 600
-[trajectory]
+LISTED = f"""\
+{BASE}[trajectory]
 kind = "listed"
 """
 

@@ -237,14 +237,14 @@ def test_three_distinct_points_have_all_their_poses_among_the_candidates():
 
 def test_refining_reaches_the_minimum_that_the_default_solver_finds():
     camera, rng = paper_camera("equidistance"), np.random.default_rng(7)
-    poses = [random_pose(rng, PAPER_OBJECT, 80.0, 0.1) for _ in range(10)]
-    pixels = np.stack([camera.project(pose.apply(PAPER_OBJECT)) for pose in poses]) + 0.4 * rng.normal(size=(10, 4, 2))
+    exact = [camera.project(random_pose(rng, PAPER_OBJECT, 80.0, 0.1).apply(PAPER_OBJECT)) for _ in range(10)]
+    pixels = np.stack(exact) + 0.4 * rng.normal(size=(10, 4, 2))
     refined = opnp.solve(PAPER_OBJECT, pixels, camera, sigma_px=0.4, refine=True)
     best = eposit.solve(PAPER_OBJECT, pixels, camera, sigma_px=0.4)
     # Both stop at steps of 1e-11. The default solver's covariance is that of a step before, up to a thousandth away.
     assert rotation_error_rad(refined.cam_from_obj.R, best.cam_from_obj.R).max() < 1e-9
-    per_deviation = np.sqrt(np.einsum("bi,bj->bij", *[np.einsum("bii->bi", best.covariance)] * 2))
-    np.testing.assert_allclose(refined.covariance / per_deviation, best.covariance / per_deviation, atol=0.02)
+    spread = np.sqrt(np.einsum("bii,bjj->bij", best.covariance, best.covariance))
+    np.testing.assert_allclose(refined.covariance / spread, best.covariance / spread, atol=0.02)
     assert np.all(opnp.solve(PAPER_OBJECT, pixels, camera).reprojection_rmse_px >= refined.reprojection_rmse_px)
 
 

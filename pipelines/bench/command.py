@@ -10,7 +10,7 @@ from rich.progress import Progress
 
 from datasets.errors import UserError
 from datasets.recipe import Recipe
-from datasets.store import refused
+from datasets.store import write_text
 from pipelines.bench import blender, equal, finders, frames, growth, memory, profile, rays, solver, whole
 from pipelines.bench.machine import facts, one_line
 from pipelines.bench.rows import Row, markdown, terminal
@@ -62,8 +62,4 @@ def bench(recipe: Recipe, poses: int, only: Sequence[str], memory_frames: int | 
                 progress.advance(bar)
     console.print(terminal(rows, one_line()))
     if out is not None:
-        try:
-            out.parent.mkdir(parents=True, exist_ok=True)
-            out.write_text(markdown(rows, facts()), encoding="utf-8")
-        except OSError as error:
-            raise refused(out, error) from error
+        write_text(out, markdown(rows, facts()))

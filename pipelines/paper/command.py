@@ -11,11 +11,10 @@ from rich.progress import Progress
 from threadpoolctl import threadpool_limits
 
 from datasets.errors import UserError
-from datasets.store import refused
+from datasets.store import refused, write_text
 from pipelines.doctor import versions
 from pipelines.engine import check_workers
 from pipelines.paper.parts import Claim, Drawing, Section
-from render.files import replace_atomically
 
 PAGE, CLAIMS = "paper.html", "claims.md"
 IMAGE_PARTS = ("images", "wide", "experiment")
@@ -94,11 +93,7 @@ def write(out: Path, sections: Sequence[Section], claims: Sequence[Claim], seeds
     )
     found = out / PAGE, out / CLAIMS
     for path, text in zip(found, (html, markdown(claims)), strict=True):
-        try:
-            with replace_atomically(path) as temporary:
-                temporary.write_text(text, encoding="utf-8")
-        except OSError as error:
-            raise refused(path, error) from error
+        write_text(path, text)
     return found
 
 

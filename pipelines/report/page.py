@@ -9,7 +9,7 @@ import jinja2
 import numpy as np
 
 from datasets.schema import COMPONENTS
-from datasets.store import RECIPE_FILE, Dataset, refused
+from datasets.store import RECIPE_FILE, Dataset, write_text
 from eposit.arrays import Array
 from pipelines.detection import Detector
 from pipelines.doctor import versions
@@ -17,7 +17,6 @@ from pipelines.report import figures
 from pipelines.report.data import ERRORS, normalised_rows, score_rows, series
 from pipelines.report.points import field_rows, point_errors, tilt_rows
 from pipelines.rows import decode_image, of_detector, points_by_frame
-from render.files import replace_atomically
 
 REPORT = "report.html"
 GALLERY = 15  # pictures at most
@@ -65,11 +64,7 @@ def write_report(dataset: Dataset) -> Path:
         versions=versions(),
     )
     path = dataset.root / REPORT
-    try:
-        with replace_atomically(path) as temporary:
-            temporary.write_text(html, encoding="utf-8")
-    except OSError as error:
-        raise refused(path, error) from error
+    write_text(path, html)
     return path
 
 
