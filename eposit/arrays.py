@@ -11,7 +11,7 @@ Mask = NDArray[np.bool_]
 
 def cross(a: Array, b: Array) -> Array:
     """Cross product along the first axis, (3, ...) with (3, ...)."""
-    product = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    product = np.empty(np.broadcast_shapes(a.shape, b.shape), np.result_type(a, b))
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         np.multiply(a[j], b[k], out=product[i])
         product[i] -= a[k] * b[j]

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from eposit.arrays import Array, Mask, pick
+from eposit.newton import CONTRACTS
+from eposit.orthography import Orthography
 from eposit.p3p import p3p_poses
 from eposit.posit import Start, posit
 from eposit.starts import Shape
@@ -26,13 +28,14 @@ def posit_checked(shape: Shape, image: Array, tol: float, max_iterations: int) -
     triangle is left out where the pose is sure to be the only one so faithful.
     """
     points_in_obj = shape.points_in_obj
-    start = posit(points_in_obj, image, tol, max_iterations)
+    system = Orthography.of(points_in_obj, image)
+    start = posit(system, tol, max_iterations)
     misfit, spread = _misfit(points_in_obj, image, start.R, start.t)
     limit = CONSISTENT_MISFIT * spread
-    quick = start.iterations <= QUICK  # the iteration contracts well: no second fixed point is near
-    clear = (misfit <= DOUBTFUL_MISFIT * spread) | (
-        quick & shape.sure(start.R, start.t, len(points_in_obj) * misfit**2)
-    )
+    clear = (misfit <= DOUBTFUL_MISFIT * spread) | (system.contraction <= CONTRACTS)
+    if not np.all(clear):
+        quick = start.iterations <= QUICK  # the iteration contracts well: no second fixed point is near
+        clear |= quick & shape.sure(start.R, start.t, len(points_in_obj) * misfit**2)
     doubtful = np.flatnonzero(~clear & np.isfinite(spread))
     if not len(doubtful):
         return start, misfit <= limit
@@ -44,10 +47,10 @@ def posit_checked(shape: Shape, image: Array, tol: float, max_iterations: int) -
     inside = np.all(np.hypot(some[0], some[1]) < CONVERGENT_TAN, axis=0) & (t[2] > 0.0)
     again = np.flatnonzero(~(misfit[doubtful] <= limit[doubtful]) & inside)
     if len(again):
-        offsets = points_in_obj[1:] - points_in_obj[0]
         forward = R[2][:, again]
-        epsilon = offsets @ forward / (t[2, again] + points_in_obj[0] @ forward)
-        start.put(doubtful[again], posit(points_in_obj, some[..., again], tol, max_iterations, epsilon, 0.5))
+        k = forward * (system.reach / (t[2, again] + points_in_obj[0] @ forward))
+        rows = doubtful[again]
+        start.put(rows, posit(system.take(rows), tol, max_iterations, k, 0.5))
         misfit, _ = _misfit(points_in_obj, image, start.R, start.t)
     return start, misfit <= limit
 

@@ -12,9 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eposit.arrays import Array, Mask, cross, pick
+from eposit.arrays import Array, Mask, pick
+from eposit.newton import CONTRACTS, STEPS, fixed_points
+from eposit.orthography import Orthography, third_axis
 
 COMPRESS = 4  # finished problems leave the arrays when they are one in so many: leaving costs, and so does staying
+NEWTON_TOL = 1e-6  # tolerance from which Newton steps pay
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,62 +40,68 @@ class Start:
 
 
 @dataclass(slots=True)
+class _Found:
+    """What the iteration ends in; rows that it has not reached, or that do not converge, are NaN."""
+
+    axes: Array  # (2, 3, b) I and J
+    iterations: NDArray[np.int64]  # (b,)
+    converged: Mask  # (b,)
+
+    def put(self, rows: NDArray[np.int64], axes: Array, good: Mask, count: NDArray[np.int64] | int) -> None:
+        """Write some rows; those that are good have converged."""
+        some = np.flatnonzero(good)
+        self.axes[..., rows[some]], self.converged[rows[some]] = pick(axes, some), True
+        self.iterations[rows] = count
+
+
+@dataclass(slots=True)
 class _Work:
     """The problems still iterated on."""
 
     rows: NDArray[np.int64]  # (a,) their numbers
-    image: Array  # (2, n - 1, a) points but M0
-    base: Array  # (2, n - 1, a) the same minus M0
-    epsilon: Array  # (n - 1, a) relative depths
-    previous: Array  # (2, 3, a) I and J of the last iteration
+    system: Orthography
+    k: Array | None  # (3, a) the unknown; zero if None
+    axes: Array  # (2, 3, a) I and J of the last step
+    change: Array  # (a,) the square of their last change; 0 before the second step
 
     def keep(self, kept: NDArray[np.int64]) -> None:
         """Drop the others."""
-        self.rows = self.rows[kept]
-        self.image, self.base, self.epsilon, self.previous = (
-            pick(values, kept) for values in (self.image, self.base, self.epsilon, self.previous)
-        )
+        self.rows, self.system = self.rows[kept], self.system.take(kept)
+        self.axes, self.change = pick(self.axes, kept), pick(self.change, kept)
+        self.k = None if self.k is None else pick(self.k, kept)
 
 
-def posit(
-    points_in_obj: Array,
-    image: Array,
-    tol: float,
-    max_iterations: int,
-    epsilon: Array | None = None,
-    step: float = 1.0,
-) -> Start:
-    """The POSIT iteration on pinhole points.
+def posit(system: Orthography, tol: float, max_iterations: int, k: Array | None = None, step: float = 1.0) -> Start:
+    """The fixed points of POSIT's iteration.
 
-    points_in_obj: (n, 3), not coplanar. image: (2, n, b), x and y at depth 1.
-    tol: stop when I and J change by less than this, relative to their length.
-    epsilon: (n - 1, b) first guess of the relative depths, zero if None. step: fraction of each update that is taken.
+    tol: stop when I and J change by less than this, relative to their length, or would in the next step if that
+        shortens the change as the last one did.
+    k: (3, b) first guess, zero if None. step: fraction of each update that is taken.
     Source:
-        Paper, equations 21 to 25; DeMenthon and Davis 1995.
+        Paper, equations 21 to 25; DeMenthon and Davis 1995. Where the iteration surely contracts and many steps are
+        needed, Newton steps find the same point.
     """
     with np.errstate(all="ignore"):
-        vectors, iterations, converged = _iterate(points_in_obj, image, tol, max_iterations, epsilon, step)
-        R = nearest_frame(vectors)
-        depth = 2.0 / np.add.reduce(lengths(vectors), axis=0)
-        t = -np.einsum("ijb,j->ib", R, points_in_obj[0])
-        t += depth
-        t[:2] += (image[:, 0] - 1.0) * depth
-    return Start(R, t, iterations, converged)
+        b = system.rest.shape[-1]
+        newton = k is None and tol <= NEWTON_TOL and max_iterations >= STEPS
+        rows = np.flatnonzero(system.contraction <= CONTRACTS) if newton else np.zeros(0, np.int64)
+        solved = fixed_points(system if len(rows) == b else system.take(rows), tol) if len(rows) else None
+        if solved is not None and len(rows) == b and np.all(solved[1]):
+            return Start(*system.pose(solved[0]), solved[2], solved[1])
+        found = _Found(np.full((2, 3, b), np.nan), np.zeros(b, np.int64), np.zeros(b, bool))
+        if solved is not None:
+            found.put(rows, *solved)
+        _iterate(system, tol, max_iterations, k, step, found)
+        return Start(*system.pose(found.axes), found.iterations, found.converged)
 
 
-def _iterate(
-    points_in_obj: Array, image: Array, tol: float, max_iterations: int, epsilon: Array | None, step: float
-) -> tuple[Array, NDArray[np.int64], Mask]:
-    """I and J, (2, 3, b), NaN where they do not converge, the number of iterations, and where they converge."""
-    offsets = points_in_obj[1:] - points_in_obj[0]
-    solver: Array = np.linalg.pinv(offsets)
-    b = image.shape[-1]
-    result = np.full((2, 3, b), np.nan)
-    iterations, converged = np.zeros(b, np.int64), np.zeros(b, bool)
-    depths = np.zeros((len(offsets), b)) if epsilon is None else epsilon
-    others = image[:, 1:]
-    work = _Work(np.arange(b), others, others - image[:, :1], depths, np.full((2, 3, b), np.inf))
-    active = np.isfinite(np.sum(image, axis=(0, 1)))
+def _iterate(system: Orthography, tol: float, max_iterations: int, k: Array | None, step: float, found: _Found) -> None:
+    """The plain iteration on the rows that have not converged yet."""
+    rows = np.flatnonzero(~found.converged & np.isfinite(system.contraction))
+    if len(rows) < len(found.converged):
+        system, k = system.take(rows), None if k is None else pick(k, rows)
+    work = _Work(rows, system, k, np.zeros((2, 3, len(rows))), np.zeros(len(rows)))
+    active = np.ones(len(rows), bool)
     for count in range(1, max_iterations + 1):
         if not np.all(active) and COMPRESS * np.count_nonzero(active) <= (COMPRESS - 1) * len(active):
             kept = np.flatnonzero(active)
@@ -100,47 +109,22 @@ def _iterate(
             active = np.ones(len(kept), bool)
         if not len(active):
             break
-        right = work.epsilon * work.image
-        right += work.base
-        vectors = np.einsum("ij,ajb->aib", solver, right)
-        scale, k = _scale_and_axis(vectors)
-        depths = np.einsum("ni,ib->nb", offsets, k)
-        work.epsilon = depths if step == 1.0 else work.epsilon + step * (depths - work.epsilon)
-        work.previous -= vectors
-        change = np.einsum("aib,aib->b", work.previous, work.previous)
-        work.previous = vectors
-        small = change <= (tol * scale) ** 2
+        scale, small = _step(work, tol, step, count)
         gone = active & (small | ~np.isfinite(scale))
         if np.any(gone) or count == max_iterations:
             gone = active if count == max_iterations else gone
-            good = np.flatnonzero(gone & small)
-            result[..., work.rows[good]], converged[work.rows[good]] = pick(vectors, good), True
-            iterations[work.rows[gone]] = count
+            found.put(work.rows[gone], work.axes[..., gone], small[gone], count)
             active = active & ~gone
-    return result, iterations, converged
 
 
-def _scale_and_axis(vectors: Array) -> tuple[Array, Array]:
-    """Scale 1 / Z0, the mean length of I and J, (2, 3, b), and the third axis k of this length, (3, b)."""
-    size = lengths(vectors)
-    scale = 0.5 * (size[0] + size[1])
-    k = cross(vectors[0], vectors[1])
-    k *= scale / np.sqrt(np.einsum("ib,ib->b", k, k))
-    return scale, k
-
-
-def lengths(vectors: Array) -> Array:
-    """(2, b) lengths of I and J, (2, 3, b)."""
-    return np.sqrt(np.einsum("aib,aib->ab", vectors, vectors))
-
-
-def nearest_frame(vectors: Array) -> Array:
-    """(3, 3, b) rotations with rows i, j, k from I and J, (2, 3, b), the defect shared between i and j."""
-    i, j = vectors / lengths(vectors)[:, None]
-    both = np.stack((i + j, i - j))
-    both *= np.sqrt(0.5) / lengths(both)[:, None]
-    rotation = np.empty((3, 3, vectors.shape[-1]))
-    np.add(both[0], both[1], out=rotation[0])
-    np.subtract(both[0], both[1], out=rotation[1])
-    rotation[2] = cross(rotation[0], rotation[1])
-    return rotation
+def _step(work: _Work, tol: float, step: float, count: int) -> tuple[Array, Mask]:
+    """One step of the iteration; the scale, and where I and J have settled."""
+    axes = work.system.axes(work.k)
+    scale, target = third_axis(axes)
+    work.k = target if step == 1.0 else step * target + (0.0 if work.k is None else (1.0 - step) * work.k)
+    moved = axes - work.axes
+    change = np.einsum("aib,aib->b", moved, moved)
+    limit = (tol * scale) ** 2
+    small = (change <= limit) | (change * change <= limit * work.change) if count > 1 else np.zeros(len(change), bool)
+    work.axes, work.change = axes, change if count > 1 else work.change
+    return scale, small

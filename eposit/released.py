@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from eposit.arrays import Array, Mask, cross, pick
 from eposit.camera import Camera
-from eposit.posit import lengths, nearest_frame
+from eposit.orthography import lengths, nearest_frame
 from eposit.problem import Problem, mark, validate
 from eposit.solution import Solution, Status, blank, join
 

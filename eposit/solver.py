@@ -51,7 +51,8 @@ def solve(
     robust: leave out wrong points, of n >= 8 up to one in four, with the same result in every run. With sigma_px a
         point is wrong by that measure, else by the scatter of the others; one image in a hundred without a wrong
         point loses one. The reprojection error and the covariance are those of the points in use, `inliers`.
-    tol: relative change of I and J at which "centred", "eposit" and "posit" stop. max_iterations: their limit.
+    tol: relative change of I and J, in the last step or as it foretells the next, at which "centred", "eposit" and
+        "posit" stop. max_iterations: their limit.
     theta_centre: for "eposit" only, the point, px, from which theta is measured; the paper takes the image centre.
 
     Returns:

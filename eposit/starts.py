@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from eposit.arrays import Array, Mask, pick
+from eposit.orthography import Orthography
 from eposit.p3p import p3p_poses
 from eposit.planar import homography_start, mirror_twin, plane_axes
 from eposit.posit import Start, posit
@@ -80,7 +81,7 @@ def centred_start(shape: Shape, rays: Array) -> Start | None:
     if not (shape.solid and shape.flatness > BOARD_RATIO):
         return None
     image, back = centred_image(rays)
-    return turn_back(back, posit(shape.points_in_obj, image, START_TOL, START_ITERATIONS))
+    return turn_back(back, posit(Orthography.of(shape.points_in_obj, image), START_TOL, START_ITERATIONS))
 
 
 def other_starts(shape: Shape, rays: Array) -> list[Start]:

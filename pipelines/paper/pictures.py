@@ -22,7 +22,7 @@ from render.target import Target
 
 HARD = {11: "steep tilt", 13: "out of focus", 22: "field's edge"}  # by the picture's number, from 1; the paper's too
 LEAST_POINTS = 4
-STEPS, LEAST_STEPS = 2000, 300  # of EPOSIT and of the released code
+STEPS = 2000  # of the released code
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,9 +115,8 @@ Solve = Callable[[Array, Array, Camera, Array], Solution]  # points in obj and i
 
 
 def by_eposit(points: Array, pixels: Array, camera: Camera, sigma: Array) -> Solution:
-    """The paper's equations, with fewer steps where there are many points: a step costs as many times as much."""
-    steps = max(STEPS * LEAST_POINTS // len(points), LEAST_STEPS)
-    return eposit.solve(points, pixels, camera, method="eposit", max_iterations=steps)
+    """The paper's equations."""
+    return eposit.solve(points, pixels, camera, method="eposit")
 
 
 def by_released(points: Array, pixels: Array, camera: Camera, sigma: Array) -> Solution:
