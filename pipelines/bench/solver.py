@@ -31,6 +31,7 @@ NOISE_PX = 0.4
 BATCH = 100_000  # poses in a batch; what takes longer than a second of it gets fewer
 SINGLE = 20  # poses in a measurement of single calls
 LOOPED = 2000  # calls of PoseLib in a measurement
+REPEATS = 7  # these calls are short, and the machine's clock changes under them
 
 Call = Callable[[Array, Array, Camera], Any]
 
@@ -88,7 +89,7 @@ def _each_alone(solver: Solver, images: Array) -> None:
 
 
 def _rows(name: str, call: Callable[[], object], count: int, loops: dict[str, Callable[[], object]]) -> Iterator[Row]:
-    own, *others = in_turn(call, *loops.values())
+    own, *others = in_turn(call, *loops.values(), repeats=REPEATS)
     for other, times in zip(loops, others, strict=True):
         yield compared(PART, name, _per_pose(own, count), other, _per_pose(times, LOOPED))
 
