@@ -6,6 +6,7 @@ have the problems last: images (2, n, b), k (3, b), and I and J, the first two a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -44,6 +45,13 @@ class Orthography:
         pull = np.einsum("ikj,ajb->aikb", solver[:, None] * offsets.T, image[:, 1:])
         contraction = np.sqrt(np.einsum("aikb,aikb->b", pull, pull))
         return Orthography(reach, points_in_obj[0], image[:, 0], rest, pull, contraction)
+
+    @staticmethod
+    def side_by_side(systems: Sequence[Orthography]) -> Orthography:
+        """Systems of several objects of the same reach and first point as one."""
+        names = ("first_seen", "rest", "pull", "contraction")
+        together = (np.concatenate([getattr(system, name) for system in systems], axis=-1) for name in names)
+        return Orthography(systems[0].reach, systems[0].first_in_obj, *together)
 
     def take(self, rows: NDArray[np.int64]) -> Orthography:
         """Some of the problems."""

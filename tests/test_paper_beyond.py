@@ -23,6 +23,7 @@ from pipelines.paper.problems import (
     rate,
     turned,
 )
+from pipelines.paper.uniqueness import ends, random_problems, uniqueness
 from tests.cameras import helix_pose
 
 
@@ -107,6 +108,23 @@ def test_more_points_help(monkeypatch):
         eposit, default, least = map(float, row[2:5])
         assert eposit > least
         assert 0.8 < default / least < 1.2  # an RMS of 3 x 121 values scatters by 4 %
+    assert section.claims[0].verdict == Verdict.HOLDS
+
+
+def test_a_fixed_point_that_is_proved_single_is_the_pose():
+    section = uniqueness(count=300)
+    for row in table_of(section).rows:
+        proved, right, wrong, lost = (value(cell) for cell in row[2:6])
+        assert proved <= right
+        assert right + wrong + lost == pytest.approx(100.0, abs=0.02)  # two digits are shown
+    assert value(table_of(section).rows[0][2]) == 100.0
+    assert value(table_of(section).rows[-1][3]) < 90.0
+    assert section.claims[0].verdict == Verdict.PARTLY
+    system, truth = random_problems(300, 0.6, 8)
+    single, right, _, _, doubled = ends(system, truth, 9)
+    assert 50 < single.sum() < 250
+    assert np.all(right[single])
+    assert not np.any(doubled[single])
 
 
 def test_a_wrong_lens_matters_off_the_axis_only():

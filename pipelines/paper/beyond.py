@@ -8,8 +8,9 @@ from pipelines.paper.efficiency import bound, more_points
 from pipelines.paper.field import field
 from pipelines.paper.parts import Section
 from pipelines.paper.robustness import robustness
+from pipelines.paper.uniqueness import uniqueness
 
 
 def beyond() -> tuple[Section, ...]:
     """All sections; that of rendered pictures takes a dataset: `field_images.field_of_images`."""
-    return field(), coverage(), assumed_lens(), bound(), more_points(), robustness()
+    return field(), uniqueness(), coverage(), assumed_lens(), bound(), more_points(), robustness()

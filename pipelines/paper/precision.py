@@ -220,7 +220,7 @@ def _principal_claims(differences: dict[tuple[str, str], Array]) -> tuple[Claim,
             turn("equations"),
             turn("released"),
             Verdict.HOLDS if worst("released", rotation) < 0.3 else Verdict.FAILS,
-            "",
+            "A centre some twenty pixels off changes theta by two degrees, and G changes slowly with theta.",
             "principal-point",
         ),
         Claim(

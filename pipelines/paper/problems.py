@@ -57,11 +57,16 @@ def repeated(pose: Pose, draws: int) -> Pose:
 
 def at_field_angle(degrees: float, count: int, seed: int) -> Pose:
     """Random rotations, with M0 at 2 m and at this angle from the optical axis, in random directions about it."""
-    rng = np.random.default_rng(seed)
+    return at_angles(np.full(count, degrees), DISTANCE_MM, np.random.default_rng(seed))
+
+
+def at_angles(degrees: Array, distance_mm: float, rng: np.random.Generator) -> Pose:
+    """The same with an angle for each pose, (b,)."""
+    count = len(degrees)
     w, x, y, z = (rng.standard_normal(count) for _ in range(4))
     theta, phi = np.deg2rad(degrees), rng.uniform(0.0, 2.0 * np.pi, count)
-    ray = np.stack((np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.full(count, np.cos(theta))), axis=1)
-    return Pose.from_quaternion(np.stack((w, x, y, z), axis=1), DISTANCE_MM * ray)
+    ray = np.stack((np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)), axis=1)
+    return Pose.from_quaternion(np.stack((w, x, y, z), axis=1), distance_mm * ray)
 
 
 def turned(pose: Pose, degrees: float, seed: int) -> Pose:
