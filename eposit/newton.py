@@ -38,10 +38,11 @@ def fixed_points(system: Orthography, tol: float) -> tuple[Array, Mask, NDArray[
         change /= scale * scale
         limit = (tol / part.contraction) ** 2  # I and J change by so much of the change of k at most
         good = (change <= limit) | (change * change <= limit * before)
-        settled[rows[good]], iterations[rows[good]], before = True, count, change
-        if np.all(good):
+        done, before = rows if np.all(good) else rows[good], change
+        settled[done], iterations[done] = True, count
+        if len(done) == len(rows):
             break
-        if np.any(good):  # the others go on alone: no problem's result depends on which others are in the batch
+        if len(done):  # the others go on alone: no problem's result depends on which others are in the batch
             left = np.flatnonzero(~good)
             rows, part, gain, before = rows[left], part.take(left), pick(gain, left), pick(before, left)
     return system.axes(k), settled, iterations

@@ -72,8 +72,9 @@ class Orthography:
 
     def pose(self, axes: Array) -> tuple[Array, Array]:
         """R (3, 3, b) and t (3, b) of I and J."""
-        R = nearest_frame(axes)
-        depth = 2.0 * self.reach / np.add.reduce(lengths(axes), axis=0)
+        size = lengths(axes)
+        R = nearest_frame(axes, size)
+        depth = 2.0 * self.reach / (size[0] + size[1])
         t = -np.einsum("ijb,j->ib", R, self.first_in_obj)
         t += depth
         t[:2] += (self.first_seen - 1.0) * depth
@@ -95,11 +96,13 @@ def lengths(axes: Array) -> Array:
     return np.sqrt(np.einsum("aib,aib->ab", axes, axes))
 
 
-def nearest_frame(axes: Array) -> Array:
-    """(3, 3, b) rotations with rows i, j, k from I and J, the defect shared between i and j."""
-    i, j = axes / lengths(axes)[:, None]
-    both = np.stack((i + j, i - j))
-    both *= np.sqrt(0.5) / lengths(both)[:, None]
+def nearest_frame(axes: Array, size: Array) -> Array:
+    """(3, 3, b) rotations with rows i, j, k from I and J and their lengths, the defect shared between i and j."""
+    i, j = axes / size[:, None]
+    both = np.empty_like(axes)
+    np.add(i, j, out=both[0])
+    np.subtract(i, j, out=both[1])
+    both *= (np.sqrt(0.5) / lengths(both))[:, None]
     rotation = np.empty((3, 3, axes.shape[-1]))
     np.add(both[0], both[1], out=rotation[0])
     np.subtract(both[0], both[1], out=rotation[1])

@@ -70,9 +70,10 @@ def _solve(problem: Problem, theta_centre: tuple[float, float] | None, tol: floa
     image = np.stack((x, y))
     vectors, iterations = _iterate(problem.points_in_obj, image, first, ratio, tol, max_iterations)
     with np.errstate(all="ignore"):
-        scale = 0.5 * np.add.reduce(lengths(vectors), axis=0)
+        size = lengths(vectors)
+        scale = 0.5 * (size[0] + size[1])
         t = np.stack((*image[:, 0] * ratio[0], ratio[0] ** 2)) / scale
-        R = nearest_frame(vectors)
+        R = nearest_frame(vectors, size)
         t -= np.einsum("ijb,j->ib", R, problem.points_in_obj[0])
     mark(status, ~np.all(np.isfinite(t), axis=0), Status.NOT_CONVERGED)
     found = blank(status, False)
