@@ -12,6 +12,15 @@ PAPER_FISHEYE = {"fx": 552.39, "fy": 552.69, "cx": 782.41, "cy": 613.71}
 PAPER_PINHOLE = {"fx": 1378.65, "fy": 1381.37, "cx": 807.41, "cy": 602.47}
 # The paper's simulated object, mm.
 PAPER_OBJECT = np.array([(0.0, 0.0, 0.0), (200.0, 0.0, 0.0), (0.0, 200.0, 0.0), (0.0, 0.0, -50.0)])
+# Radius over focal length, from the textbook and not from eposit; angles in radians.
+RADIUS = {
+    "perspective": np.tan,
+    "stereographic": lambda a: 2 * np.tan(a / 2),
+    "equidistance": lambda a: a,
+    "equisolid": lambda a: 2 * np.sin(a / 2),
+    "orthogonal": np.sin,
+    "kannala_brandt": lambda a: a * (1 + KB[0] * a**2 + KB[1] * a**4 + KB[2] * a**6 + KB[3] * a**8),
+}
 PAST_90 = {"stereographic", "equidistance", "equisolid", "kannala_brandt"}
 
 

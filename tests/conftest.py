@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 from dataclasses import dataclass
 
@@ -79,6 +80,18 @@ def tiny(tmp_path_factory):
     recipe.write_text(TINY)
     assert command("run", recipe, "--out", folder / "dataset", "--quiet") == 0
     return TINY, folder / "dataset"
+
+
+@pytest.fixture
+def root(tiny, tmp_path):
+    """The tiny dataset with one kind of estimate, as every kind's figures take time."""
+    root = tmp_path / "dataset"
+    shutil.copytree(tiny[1], root)
+    for table in ("estimates", "scores"):
+        for path in (root / table).iterdir():
+            if not path.name.startswith("best-detected-exact-all"):
+                path.unlink()
+    return root
 
 
 @pytest.fixture

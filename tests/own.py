@@ -1,4 +1,4 @@
-"""A user's own module, for the tests of functions that are named package.module:function."""
+"""A user's own module, for the tests of functions that are named package.module:function, and the rows it makes."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import importlib
 import itertools
 import sys
 import textwrap
+
+import pyarrow.parquet as pq
 
 _numbers = itertools.count()
 
@@ -19,3 +21,9 @@ def own_module(folder, patch, text):
     patch.delitem(sys.modules, name, raising=False)
     importlib.invalidate_caches()
     return name
+
+
+def image_rows(root, table, name, camera="exact"):
+    """The rows that a system which goes from image to pose has in a dataset's table."""
+    paths = sorted((root / table).glob(f"{name.replace(':', '@')}-image-{camera}-all-0*"))
+    return [row for path in paths for row in pq.read_table(path).to_pylist()]

@@ -11,20 +11,12 @@ from eposit import LENS_NAMES, Camera, Pose
 from pipelines.generate import outline_centroid
 from render import backend
 from render.sensor import sensor_dict
-from tests.cameras import KB
+from tests.cameras import KB, RADIUS
 
 WIDTH, HEIGHT, SAMPLES = 800, 600, 256
 DIRECTIONS, DOT_PX, DISTANCE_MM = 12, 4.0, 1000.0
 CENTRE = (403.3, 296.8)
 MEAN_PX, DOT_RMS_PX = 0.005, 0.02
-RADIUS = {
-    "perspective": np.tan,
-    "stereographic": lambda a: 2 * np.tan(a / 2),
-    "equidistance": lambda a: a,
-    "equisolid": lambda a: 2 * np.sin(a / 2),
-    "orthogonal": np.sin,
-    "kannala_brandt": lambda a: a * (1 + KB[0] * a**2 + KB[1] * a**4 + KB[2] * a**6 + KB[3] * a**8),
-}
 
 
 def camera_for(lens):

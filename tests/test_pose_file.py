@@ -1,7 +1,6 @@
 """Files of poses that other systems made: their forms, what is missing or wrong in them, and the same scores."""
 
 import csv
-import shutil
 
 import numpy as np
 import pyarrow as pa
@@ -10,22 +9,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pipelines.report.page import REPORT
+from tests.own import image_rows
 from tests.wrong_input import assert_one_sentence, files
 
 Q, T = ("q_w", "q_x", "q_y", "q_z"), ("t_x_mm", "t_y_mm", "t_z_mm")
 R = tuple(f"r{i}{j}" for i in "123" for j in "123")
-
-
-@pytest.fixture
-def root(tiny, tmp_path):
-    """The tiny dataset with one kind of estimate, as every kind's figures take time."""
-    root = tmp_path / "dataset"
-    shutil.copytree(tiny[1], root)
-    for table in ("estimates", "scores"):
-        for path in (root / table).iterdir():
-            if not path.name.startswith("best-detected-exact-all"):
-                path.unlink()
-    return root
 
 
 @pytest.fixture
@@ -66,8 +54,7 @@ def write(path, rows):
 
 
 def made(root, table, name="theirs", camera="exact"):
-    paths = sorted((root / table).glob(f"{name}-image-{camera}-all-0*"))
-    return [row for path in paths for row in pq.read_table(path).to_pylist()]
+    return image_rows(root, table, name, camera)
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet", ".CSV"])

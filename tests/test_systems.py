@@ -5,12 +5,11 @@ import shutil
 from pathlib import Path
 
 import numpy as np
-import pyarrow.parquet as pq
 import pytest
 
 from datasets.store import open_dataset
 from pipelines.report.page import REPORT
-from tests.own import own_module
+from tests.own import image_rows, own_module
 from tests.wrong_input import assert_one_sentence, files
 
 README = (Path(__file__).resolve().parents[1] / "README.md").read_text()
@@ -19,23 +18,6 @@ README = (Path(__file__).resolve().parents[1] / "README.md").read_text()
 @pytest.fixture
 def own(tmp_path, monkeypatch):
     return lambda text: own_module(tmp_path, monkeypatch, text)
-
-
-@pytest.fixture
-def root(tiny, tmp_path):
-    """The tiny dataset with one kind of estimate, as every kind's figures take time."""
-    root = tmp_path / "dataset"
-    shutil.copytree(tiny[1], root)
-    for table in ("estimates", "scores"):
-        for path in (root / table).iterdir():
-            if not path.name.startswith("best-detected-exact-all"):
-                path.unlink()
-    return root
-
-
-def rows(root, table, name, camera="exact"):
-    paths = sorted((root / table).glob(f"{name.replace(':', '@')}-image-{camera}-all-0*"))
-    return [row for path in paths for row in pq.read_table(path).to_pylist()]
 
 
 def toy():
@@ -49,7 +31,7 @@ def test_the_readmes_estimator_comes_out_in_tables_and_report(own, root, cli, co
     assert cli("estimate", root, "--estimator", name, "-q").code == 0
     assert cli("score", root, "-q").code == 0
     assert cli("report", root).code == 0
-    made, scores = rows(root, "estimates", name), rows(root, "scores", name)
+    made, scores = image_rows(root, "estimates", name), image_rows(root, "scores", name)
     assert [row["frame_id"] for row in made] == [0, 1]
     for row, score in zip(made, scores, strict=True):
         key = {"solver": name, "points": "image", "camera": "exact", "use": "all", "draw": 0, "status": "ok"}
@@ -69,7 +51,7 @@ def test_the_readmes_estimator_comes_out_in_tables_and_report(own, root, cli, co
     assert cli("estimate", root, "--estimator", name, "-q").code == 0
     assert {path: data for path, (_, data) in before.items()} == {path: data for path, (_, data) in files(root).items()}
     assert cli("estimate", root, "--estimator", name, "-q", "--again", "--workers", 2).code == 0
-    assert rows(root, "scores", name) == []
+    assert image_rows(root, "scores", name) == []
     assert cli("score", root, "-q").code == 0
     assert content(root) == digest
 
@@ -90,7 +72,7 @@ SEES = """
 def test_what_a_system_is_given(camera, fx, cx, own, root, cli):
     name = f"{own(SEES)}:estimate"
     assert cli("estimate", root, "--estimator", name, "--camera", camera, "-q").code == 0
-    for row in rows(root, "estimates", name, camera):
+    for row in image_rows(root, "estimates", name, camera):
         assert (row["camera"], row["status"]) == (camera, "ok")
         assert (row["t_x_mm"], row["t_y_mm"], row["t_z_mm"]) == (fx, cx, 100.0)
 
@@ -129,8 +111,8 @@ def test_failures_of_a_system_are_rows(own, root, cli):
     assert cli("estimate", root, "--estimator", f"{name}:never", "-q").err == ""
     assert cli("score", root, "-q").code == 0
     assert cli("report", root).code == 0
-    assert [row["status"] for row in rows(root, "scores", f"{name}:estimate")] == ["too dark", "solver_error"]
-    never = rows(root, "scores", f"{name}:never")
+    assert [row["status"] for row in image_rows(root, "scores", f"{name}:estimate")] == ["too dark", "solver_error"]
+    never = image_rows(root, "scores", f"{name}:never")
     assert [(row["status"], row["star"]) for row in never] == [("no_solution", True)] * 2
     found = rf"<td>{name}:never image exact all</td><td>pinhole</td><td>2</td><td class=\"bad\">2</td>\s*<td>2</td>"
     assert re.search(found, (root / REPORT).read_text())
