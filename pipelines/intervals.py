@@ -1,4 +1,4 @@
-"""Bootstrap intervals of medians, percentiles, means and rates: every score says how well it is known."""
+"""Intervals of medians, percentiles, means and rates: every score says how well it is known."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from eposit.arrays import Array
+from eposit.arrays import Array, Mask
 
 RESAMPLES = 1000
 LEVEL = 0.95
+NORMAL_97 = 1.959963984540054  # quantile of 0.975
 CHUNK_VALUES = 4_000_000  # resampled values held at once
 
 
@@ -71,3 +72,27 @@ def percentile95(values: Array) -> Array:
 def mean(values: Array) -> Array:
     """(r, m) to (r,), NaN left out: of failures as 0 and 1, a rate."""
     return np.nanmean(values, axis=1)
+
+
+def rate(happened: Mask) -> Interval:
+    """Share of true values, (n,) or (n, k), with the bootstrap's interval over the first axis.
+
+    Where all are alike a bootstrap knows no scatter: then it is Wilson's interval over the values.
+    """
+    if np.all(happened) or not np.any(happened):
+        return wilson(happened.ravel())
+    return bootstrap(happened.astype(np.float64), mean, resamples=200)
+
+
+def wilson(happened: Mask) -> Interval:
+    """Share of true values that are independent of each other, with Wilson's interval (Wilson 1927)."""
+    n, p, z2 = len(happened), float(np.mean(happened)), NORMAL_97**2
+    centre = (p + z2 / (2 * n)) / (1.0 + z2 / n)
+    half = NORMAL_97 / (1.0 + z2 / n) * np.sqrt(p * (1.0 - p) / n + z2 / (4 * n * n))
+    return Interval(p, max(0.0, float(centre - half)), min(1.0, float(centre + half)))
+
+
+def percent(value: Interval, digits: int = 1) -> str:
+    """`95.0 [94.6, 95.3] %`."""
+    shown = [f"{100.0 * number:.{digits}f}" for number in (value.value, value.low, value.high)]
+    return f"{shown[0]} [{shown[1]}, {shown[2]}] %"

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy.stats import binomtest
 
-from pipelines.intervals import bootstrap, mean, median, percentile95
+from pipelines.intervals import bootstrap, mean, median, percent, percentile95, rate, wilson
 
 
 def test_the_interval_of_a_mean_is_that_of_the_normal_distribution():
@@ -41,3 +42,19 @@ def test_missing_values_take_no_part_and_nothing_gives_nan():
 def test_the_same_data_give_the_same_interval():
     values = np.random.default_rng(3).standard_normal(30)
     assert bootstrap(values, median) == bootstrap(values, median)
+
+
+def test_rates_have_wilsons_interval():
+    for good, n in ((0, 20), (7, 20), (20, 20), (950, 1000)):
+        found = wilson(np.arange(n) < good)
+        interval = binomtest(good, n).proportion_ci(method="wilson")
+        np.testing.assert_allclose((found.low, found.high), (interval.low, interval.high), atol=1e-12)
+
+
+def test_a_rate_is_known_even_where_nothing_happened():
+    never, seldom = np.zeros((300, 4), bool), np.arange(1200).reshape(300, 4) % 40 == 0
+    assert rate(never) == wilson(never.ravel())
+    assert rate(never).high == pytest.approx(3.83 / 1200, rel=0.01)  # z^2 / (n + z^2)
+    found = rate(seldom)
+    assert found.low < found.value == 0.025 < found.high
+    assert percent(found).startswith("2.5 [")

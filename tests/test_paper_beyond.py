@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.stats import binomtest, chi2
+from scipy.stats import chi2
 
 from datasets.errors import UserError
 from pipelines.paper import efficiency, robustness
@@ -20,7 +20,6 @@ from pipelines.paper.problems import (
     camera_with,
     helix,
     information,
-    rate,
     turned,
 )
 from pipelines.paper.uniqueness import ends, random_problems, uniqueness
@@ -33,13 +32,6 @@ def table_of(section, title=""):
 
 def value(cell):
     return float(cell.split()[0])
-
-
-def test_rates_have_wilsons_interval():
-    for good, n in ((0, 20), (7, 20), (20, 20), (950, 1000)):
-        found = rate(np.arange(n) < good)
-        interval = binomtest(good, n).proportion_ci(method="wilson")
-        np.testing.assert_allclose((found.low, found.high), (interval.low, interval.high), atol=1e-12)
 
 
 def test_poses_are_where_they_are_said_to_be():

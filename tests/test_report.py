@@ -5,7 +5,7 @@ import re
 import numpy as np
 
 from datasets.store import open_dataset
-from pipelines.report.data import normalised_rows, score_rows, series
+from pipelines.report.data import ERRORS, Series, normalised_rows, score_rows, series
 from pipelines.report.page import REPORT, write_report
 from pipelines.report.points import field_rows, point_errors, tilt_rows
 from pipelines.rows import of_detector
@@ -36,10 +36,24 @@ def test_failures_are_counted_and_kept_out_of_medians(tiny):
     for item in found:
         assert np.isnan(item.errors["rotation_error_deg"][item.failed]).all()
         assert np.all(item.star[item.failed])
+    for row in rows:
+        for score in row["rotation_error_deg"] or ():
+            assert score.low <= score.value <= score.high
+        assert row["failed_rate"].value == row["failed"] / row["n"]
     broken = found[0]
     broken.failed[:] = True
     assert all(row["rotation_error_deg"] is None for row in score_rows([broken], cameras))
     assert sum(row["failed"] for row in score_rows([broken], cameras)) == len(broken.failed)
+
+
+def test_draws_of_one_frame_stay_together_in_the_intervals():
+    errors = {column: np.repeat([1.0, 2.0, 3.0, 4.0], 25) for column in ERRORS}
+    frame, never = np.repeat([7, 8, 9, 10], 25), np.zeros(100, bool)
+    (row,) = score_rows(
+        [Series("x", frame, errors, np.full((100, 6), np.nan), never, never)], dict.fromkeys((7, 8, 9, 10), "a")
+    )
+    # Of four frames some samples lack the middle two; of a hundred values that would never happen.
+    assert (row["rx_error_deg"][0].low, row["rx_error_deg"][0].high) == (1.0, 4.0)
 
 
 FRAME_COLUMNS = ["frame_id", "camera_name", "tilt_deg", "cx_px", "cy_px"]

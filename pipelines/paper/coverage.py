@@ -6,8 +6,9 @@ import numpy as np
 
 import eposit
 from eposit.arrays import Array
+from pipelines.intervals import percent, wilson
 from pipelines.paper.parts import Section, Table
-from pipelines.paper.problems import SIGMA_PX, camera_with, cloud, errors_of, helix, information, noisy, percent, rate
+from pipelines.paper.problems import SIGMA_PX, camera_with, cloud, errors_of, helix, information, noisy
 
 CHI_SQUARE_95 = 12.591587243743977  # 95 % quantile of chi-square with 6 degrees of freedom
 CASES = (("perspective", 4), ("perspective", 20), ("orthogonal", 4), ("orthogonal", 20))
@@ -21,7 +22,7 @@ def coverage(trials: int = 20000, sigma_px: float = SIGMA_PX, seed: int = 2) -> 
     for lens, n in CASES:
         estimate, truth = squared_errors(lens, n, trials, sigma_px, seed)
         lost = int(np.sum(~np.isfinite(estimate)))
-        shares = (percent(rate(squares <= CHI_SQUARE_95), 2) for squares in (estimate, truth))
+        shares = (percent(wilson(squares <= CHI_SQUARE_95), 2) for squares in (estimate, truth))
         rows.append((LENS_TEXT[lens], str(n), *shares, str(lost)))
     title = f"Share of {trials} poses whose 95 % region holds the truth, with its 95 % interval"
     note = (

@@ -12,19 +12,9 @@ import eposit
 from eposit import Camera, Pose, Solution
 from eposit.arrays import Array, Mask
 from pipelines.drawing import STYLE, svg
-from pipelines.intervals import Interval
+from pipelines.intervals import Interval, percent, wilson
 from pipelines.paper.parts import Drawing, Section, Table
-from pipelines.paper.problems import (
-    OBJECT,
-    SIGMA_PX,
-    at_field_angle,
-    bounds,
-    errors_of,
-    information,
-    noisy,
-    percent,
-    rate,
-)
+from pipelines.paper.problems import OBJECT, SIGMA_PX, at_field_angle, bounds, errors_of, information, noisy
 from pipelines.solvers.names import find_solver
 
 ANGLES = tuple(range(0, 111, 5))
@@ -80,7 +70,7 @@ def _rates(
     for angle in angles:
         pose = at_field_angle(angle, trials, seed + angle)
         for name in SOLVERS:
-            found[name].append(rate(success(name, pose, seed + angle)))
+            found[name].append(wilson(success(name, pose, seed + angle)))
     return found
 
 

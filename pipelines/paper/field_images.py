@@ -17,9 +17,9 @@ from eposit.arrays import Array
 from eposit.pose import rotation_error_rad
 from pipelines.detect import path_of
 from pipelines.detection import Detector
+from pipelines.intervals import percent, wilson
 from pipelines.paper.field import LIMIT_DEG, SOLVERS, curves, solve_by
 from pipelines.paper.parts import Drawing, Section, Table
-from pipelines.paper.problems import percent, rate
 from pipelines.rows import camera_of, covariances_by_frame, points_by_frame, poses
 
 ROTATION_DEG = 2.0
@@ -54,7 +54,7 @@ def field_of_images(folder: Path) -> Section:
         raise UserError(f"{folder} has no frames; run the recipe wide into it first")
     angles = tuple(sorted({one.angle for one in seen}))
     found = {
-        name: [rate(np.array([_succeeds(name, obj, one) for one in seen if one.angle == a and one.found] or [False]))
+        name: [wilson(np.array([_succeeds(name, obj, one) for one in seen if one.angle == a and one.found] or [False]))
                for a in angles]
         for name in SOLVERS
     }  # fmt: skip

@@ -14,6 +14,11 @@ class Verdict(StrEnum):
     FAILS = "does not hold"
 
 
+def held(condition: bool, otherwise: Verdict = Verdict.FAILS) -> Verdict:
+    """The verdict that a measured condition gives."""
+    return Verdict.HOLDS if condition else otherwise
+
+
 @dataclass(frozen=True, slots=True)
 class Claim:
     """One claim of the paper beside what we measure."""

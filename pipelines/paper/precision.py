@@ -11,7 +11,7 @@ from eposit.arrays import Array
 from eposit.pose import euler_from_rotation
 from pipelines.intervals import Interval, bootstrap, mean
 from pipelines.paper import simulation as sim
-from pipelines.paper.parts import Claim, Drawing, Section, Table, Verdict
+from pipelines.paper.parts import Claim, Drawing, Section, Table, Verdict, held
 from pipelines.paper.plots import boxes, curves
 from pipelines.paper.problems import OBJECT, helix
 
@@ -91,7 +91,7 @@ def _precision_claims(found: dict[tuple[str, str], Array]) -> tuple[Claim, ...]:
             "about 0",
             largest_text("equations", rotation, "deg"),
             largest_text("released", rotation, "deg"),
-            _held(largest("released", rotation) < 0.1 * std),
+            held(largest("released", rotation) < 0.1 * std),
             f"A tenth of one pose's scatter (orthogonal, rx: {std:.2g} deg) is allowed; the wrong focal length hardly "
             "turns the pose.",
             "precision",
@@ -102,7 +102,7 @@ def _precision_claims(found: dict[tuple[str, str], Array]) -> tuple[Claim, ...]:
             "about 0",
             largest_text("equations", place, "mm"),
             largest_text("released", place, "mm"),
-            _held(largest("released", place) < 1.0),
+            held(largest("released", place) < 1.0),
             "Within 1 mm, with the true principal point subtracted. Where the image centre is subtracted as well (a "
             "user without calibration) they are tens of millimetres: see the sensitivity table.",
             "precision",
@@ -113,7 +113,7 @@ def _precision_claims(found: dict[tuple[str, str], Array]) -> tuple[Claim, ...]:
             "50 mm",
             z("equations"),
             z("released"),
-            _held(all(35.0 < -means["released", lens][5] < 60.0 for lens in sim.LENSES)),
+            held(all(35.0 < -means["released", lens][5] < 60.0 for lens in sim.LENSES)),
             "It is the focal length: 541 for 552.5 px is 2.1 % of 2045 mm. With the true focal length it is zero "
             "within the noise (sensitivity table). The pinhole's is nearer to 40.",
             "precision",
@@ -134,7 +134,7 @@ def _precision_claims(found: dict[tuple[str, str], Array]) -> tuple[Claim, ...]:
             "0.01 deg",
             apart_text("equations", rotation, "deg"),
             apart_text("released", rotation, "deg"),
-            Verdict.HOLDS if agree[0] <= 0.015 else Verdict.PARTLY,
+            held(agree[0] <= 0.015, Verdict.PARTLY),
             "The noise is shared by the four lenses; with draws of their own the means of one run differ by the "
             f"scatter of a mean of 361 poses, {std / 19.0:.1g} deg.",
             "precision",
@@ -145,7 +145,7 @@ def _precision_claims(found: dict[tuple[str, str], Array]) -> tuple[Claim, ...]:
             "0.02 mm",
             apart_text("equations", place, "mm"),
             apart_text("released", place, "mm"),
-            Verdict.HOLDS if agree[1] <= 0.02 else Verdict.PARTLY,
+            held(agree[1] <= 0.02, Verdict.PARTLY),
             "Shared noise, as above.",
             "precision",
         ),
@@ -155,7 +155,7 @@ def _precision_claims(found: dict[tuple[str, str], Array]) -> tuple[Claim, ...]:
             "6 mm",
             apart_text("equations", depth, "mm"),
             apart_text("released", depth, "mm"),
-            Verdict.HOLDS if 3.0 <= agree[2] <= 6.5 else Verdict.PARTLY,
+            held(3.0 <= agree[2] <= 6.5, Verdict.PARTLY),
             "Only the released behaviour spreads them: it applies G of M0 twice. By the equations they agree to a "
             "fraction of a millimetre, because the object is near the axis.",
             "precision",
@@ -219,7 +219,7 @@ def _principal_claims(differences: dict[tuple[str, str], Array]) -> tuple[Claim,
             "0.3 deg",
             turn("equations"),
             turn("released"),
-            Verdict.HOLDS if worst("released", rotation) < 0.3 else Verdict.FAILS,
+            held(worst("released", rotation) < 0.3),
             "A centre some twenty pixels off changes theta by two degrees, and G changes slowly with theta.",
             "principal-point",
         ),
@@ -229,7 +229,7 @@ def _principal_claims(differences: dict[tuple[str, str], Array]) -> tuple[Claim,
             "1.9 mm",
             shift("equations"),
             shift("released"),
-            Verdict.HOLDS if worst("released", depth) < 1.9 else Verdict.PARTLY,
+            held(worst("released", depth) < 1.9, Verdict.PARTLY),
             "It holds in x and y. In z the mean difference is larger, under the equations as under the released code.",
             "principal-point",
         ),
@@ -275,10 +275,6 @@ def _ratio_apart(turn_deg: float) -> float:
     beside = start[:, None] + np.einsum("bij,nj->bni", path.R, OBJECT[1:]) * np.array([1.0, 1.0, 0.0])
     cosine = [part[..., 2] / np.linalg.norm(part, axis=-1) for part in (start[:, None], beside)]
     return float(np.abs(cosine[1] / cosine[0] - 1.0).max())
-
-
-def _held(condition: bool) -> Verdict:
-    return Verdict.HOLDS if condition else Verdict.FAILS
 
 
 def _everywhere() -> str:

@@ -9,7 +9,6 @@ from eposit import Camera, Pose, Solution
 from eposit.arrays import Array, Mask
 from eposit.pose import rotation_error_vector, rotation_from_vector
 from eposit.refine import covariance, normal_equations, whitening
-from pipelines.intervals import Interval
 from render.target import Target
 
 OBJECT = np.array([(0.0, 0.0, 0.0), (200.0, 0.0, 0.0), (0.0, 200.0, 0.0), (0.0, 0.0, -50.0)])  # the paper's, mm
@@ -18,7 +17,6 @@ DISTANCE_MM = 2000.0
 SIDE_MM = 200.0  # of the cube of more points
 CLOUD_SEED = 55
 NORMAL_MEDIAN = 0.6744897501960817  # of the absolute value, over the standard deviation
-NORMAL_97 = 1.959963984540054  # quantile of 0.975
 
 
 def camera_with(lens: str) -> Camera:
@@ -108,17 +106,3 @@ def information(
 def bounds(normal: Array) -> Array:
     """(b, 6) Cramer-Rao standard deviations, rad and mm."""
     return np.sqrt(np.diagonal(covariance(normal), axis1=1, axis2=2))
-
-
-def rate(successes: Mask) -> Interval:
-    """Share of true values with Wilson's 95 % interval (Wilson 1927)."""
-    n, p, z2 = len(successes), float(np.mean(successes)), NORMAL_97**2
-    centre = (p + z2 / (2 * n)) / (1.0 + z2 / n)
-    half = NORMAL_97 / (1.0 + z2 / n) * np.sqrt(p * (1.0 - p) / n + z2 / (4 * n * n))
-    return Interval(p, float(centre - half), float(centre + half))
-
-
-def percent(value: Interval, digits: int = 1) -> str:
-    """`95.0 [94.6, 95.3] %`."""
-    shown = [f"{100.0 * number:.{digits}f}" for number in (value.value, value.low, value.high)]
-    return f"{shown[0]} [{shown[1]}, {shown[2]}] %"

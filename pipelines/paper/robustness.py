@@ -9,9 +9,10 @@ import eposit
 from eposit import Pose
 from eposit.arrays import Array, Mask
 from eposit.pose import rotation_from_vector
+from pipelines.intervals import percent, wilson
 from pipelines.paper.efficiency import CAMERAS
 from pipelines.paper.parts import Section, Table
-from pipelines.paper.problems import SIGMA_PX, bounds, camera_with, errors_of, information, noisy, percent, rate
+from pipelines.paper.problems import SIGMA_PX, bounds, camera_with, errors_of, information, noisy
 from render.target import Target
 
 MOVED_PX = (5.0, 500.0)  # logarithmically even
@@ -70,7 +71,7 @@ def _trial(lens: str, points: Array, spoil: str, sigma: float | None, trials: in
     near = np.all(np.abs(ratio) < WITHIN, axis=1)
     lost = np.any(~solution.inliers & right, axis=1)
     rms = float(np.sqrt(np.nanmean(ratio**2)))
-    return percent(rate(near & ~kept)), percent(rate(kept)), percent(rate(lost)), f"{rms:.3f}"
+    return percent(wilson(near & ~kept)), percent(wilson(kept)), percent(wilson(lost)), f"{rms:.3f}"
 
 
 def spoiled(pixels: Array, spoil: str, seed: int) -> tuple[Array, Mask]:

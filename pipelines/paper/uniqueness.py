@@ -9,8 +9,9 @@ from eposit.arrays import Array, Mask
 from eposit.orthography import Orthography
 from eposit.pose import rotation_error_rad
 from eposit.posit import posit
-from pipelines.paper.parts import Claim, Section, Table, Verdict
-from pipelines.paper.problems import OBJECT, SIDE_MM, at_angles, helix, percent, rate, turned
+from pipelines.intervals import percent, wilson
+from pipelines.paper.parts import Claim, Section, Table, Verdict, held
+from pipelines.paper.problems import OBJECT, SIDE_MM, at_angles, helix, turned
 
 LIMIT_DEG = 40.0  # all points of a random problem lie inside: EPOSIT's own limit is 54.7
 FAR_DEG = 30.0
@@ -37,7 +38,7 @@ def uniqueness(count: int = 4000, seed: int = 6) -> Section:
     }
     found = {name: ends(*scene, seed) for name, scene in scenes.items()}
     rows = tuple(
-        (name, str(len(masks[0])), *(percent(rate(mask), 2) for mask in masks)) for name, masks in found.items()
+        (name, str(len(masks[0])), *(percent(wilson(mask), 2) for mask in masks)) for name, masks in found.items()
     )
     intro = (
         f"Four points without noise, all within {LIMIT_DEG:g} degrees of the axis for random objects. The iteration "
@@ -91,12 +92,12 @@ def _claim(found: dict[str, tuple[Mask, ...]]) -> Claim:
         text="The solution is unique, since it is found by iterating",
         paper="-",
         equations=(
-            f"on the helix one fixed point in {percent(rate(near[0]), 0)}; of random objects of {100 * SIZES[-1]:g} % "
-            f"of their distance {percent(rate(deep[1]), 2)} end in the pose, {percent(rate(deep[2]), 2)} elsewhere, "
-            f"and {percent(rate(deep[4]), 2)} have another fixed point"
+            f"on the helix one fixed point in {percent(wilson(near[0]), 0)}; of random objects of {100 * SIZES[-1]:g} "
+            f"% of their distance {percent(wilson(deep[1]), 2)} end in the pose, {percent(wilson(deep[2]), 2)} "
+            f"elsewhere, and {percent(wilson(deep[4]), 2)} have another fixed point"
         ),
         released="the same iteration",
-        verdict=Verdict.HOLDS if always else Verdict.PARTLY,
+        verdict=held(always, Verdict.PARTLY),
         why=(
             "An iteration returns one answer, which does not make it the only one. Where the object is small and near "
             "the axis a bound on the slope proves one fixed point; large objects can have a second, or one that repels."

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from datasets.schema import COMPONENTS
 from eposit.arrays import Array, Mask
+from pipelines.intervals import bootstrap, median, percentile95, rate
 
 ERRORS = {
     "rotation_error_deg": "rotation, deg",
@@ -23,6 +24,7 @@ ERRORS = {
     "t_error_relative": "translation, relative",
     "reprojection_rmse_px": "reprojection, px",
 }
+RESAMPLES = 200  # ends of an interval are then good to a tenth of its length
 SETTING = ("solver", "points", "camera", "use")
 
 
@@ -53,17 +55,25 @@ def series(scores: pa.Table) -> list[Series]:
 
 
 def score_rows(found: list[Series], cameras: dict[int, str]) -> list[dict[str, Any]]:
-    """Medians and 95th percentiles of absolute errors, and failures, for each setting and camera."""
+    """Medians and 95th percentiles of absolute errors, and failures, for each setting and camera, with intervals.
+
+    The intervals are bootstrapped over the frames; the draws of a frame stay together.
+    """
     rows: list[dict[str, Any]] = []
     for item in found:
         camera = np.array([cameras[int(frame)] for frame in item.frame_id])
         for name in dict.fromkeys(camera.tolist()):
             mask = camera == name
-            row: dict[str, Any] = {"setting": item.name, "camera": name, "n": int(mask.sum())}
-            row["failed"], row["star"] = int(item.failed[mask].sum()), int(item.star[mask].sum())
+            order = np.flatnonzero(mask)[np.argsort(item.frame_id[mask], kind="stable")]
+            by_frame = order.reshape(len(np.unique(item.frame_id[mask])), -1)  # every frame has all draws
+            failed, star = item.failed[by_frame], item.star[by_frame]
+            row: dict[str, Any] = {"setting": item.name, "camera": name, "n": order.size}
+            row |= {"failed": int(failed.sum()), "star": int(star.sum())}
+            row |= {"failed_rate": rate(failed), "star_rate": rate(star)}
             for column in ERRORS:
-                values = np.abs(item.errors[column][mask & ~item.failed])
-                row[column] = (float(np.median(values)), float(np.percentile(values, 95))) if len(values) else None
+                values = np.where(failed, np.nan, np.abs(item.errors[column][by_frame]))
+                both = [bootstrap(values, statistic, resamples=RESAMPLES) for statistic in (median, percentile95)]
+                row[column] = None if np.isnan(both[0].value) else both
             rows.append(row)
     return rows
 

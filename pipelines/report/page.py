@@ -13,6 +13,7 @@ from datasets.store import RECIPE_FILE, Dataset, write_text
 from eposit.arrays import Array
 from pipelines.detection import Detector
 from pipelines.doctor import versions
+from pipelines.intervals import Interval
 from pipelines.report import figures
 from pipelines.report.data import ERRORS, normalised_rows, score_rows, series
 from pipelines.report.points import field_rows, point_errors, tilt_rows
@@ -46,6 +47,7 @@ def write_report(dataset: Dataset) -> Path:
         loader=jinja2.FileSystemLoader(Path(__file__).parent), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
     environment.filters["number"] = _number
+    environment.filters["share"] = _share
     html = environment.get_template("page.html").render(
         recipe=dataset.recipe,
         recipe_text=(dataset.root / RECIPE_FILE).read_text(encoding="utf-8"),
@@ -92,7 +94,11 @@ def _gallery(dataset: Dataset, frames: list[dict[str, Any]]) -> list[dict[str, A
     return pictures
 
 
-def _number(value: float | None) -> str:
+def _number(value: float | None, digits: int = 3) -> str:
     if value is None or not np.isfinite(value):
         return "\N{EN DASH}"
-    return f"{value:.3g}" if abs(value) >= 1e-4 or value == 0.0 else f"{value:.1e}"
+    return f"{value:.{digits}g}" if abs(value) >= 1e-4 or value == 0.0 else f"{value:.1e}"
+
+
+def _share(found: Interval) -> str:
+    return f"[{100.0 * found.low:.1f}, {100.0 * found.high:.1f}] %"
