@@ -25,7 +25,8 @@ def posit_checked(shape: Shape, image: Array, tol: float, max_iterations: int) -
     need not attract it. A misfit of a tenth of the points' spread tells, and for noise-free points the poses of a
     triangle do: one of them fits exactly. From it the same equations are iterated again with half steps, provided
     that all points lie below atan(sqrt 2). Under noise a flat object's misfit is large and no reason to reject. The
-    triangle is left out where the pose is sure to be the only one so faithful.
+    triangle is left out where the iteration has one fixed point, and where the pose is sure to be the only one so
+    faithful.
     """
     points_in_obj = shape.points_in_obj
     system = Orthography.of(points_in_obj, image)

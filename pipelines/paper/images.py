@@ -54,7 +54,8 @@ def images(folder: Path, workers: int, tell: Callable[[str], None]) -> Section:
     intro = (
         "The paper's object as a board of 5 x 4 squares, its circle 50 mm high in the place of the fourth point, "
         "rendered through the five lenses. Detection is far better than the paper's 0.4 px, so that what is left is "
-        "the bias of the assumed camera."
+        "the bias of the assumed camera. At large tilts so high a circle is seen over the edge of a square or of the "
+        "board; where it is not found, four points give no pose."
     )
     return Section("On rendered pictures", intro, tables)
 
