@@ -56,7 +56,6 @@ def reproduce(out: Path, only: Sequence[str], seeds: int, points_only: bool, wor
     console, sections, claims = Console(), list[Section](), list[Claim]()
     # The batches are of small matrices, which threads only slow down.
     with Progress(console=console) as progress, threadpool_limits(1):
-        bar = progress.add_task("")
         known = parts(out, seeds, workers, lambda text: progress.update(bar, description=text))
         for name in only:
             if name not in known:
@@ -68,7 +67,7 @@ def reproduce(out: Path, only: Sequence[str], seeds: int, points_only: bool, wor
             out.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise refused(out, error) from error
-        progress.update(bar, total=len(chosen))
+        bar = progress.add_task("", total=len(chosen))
         for name in chosen:
             progress.update(bar, description=name)
             for section in known[name]():
