@@ -18,8 +18,10 @@ QUICK = 40  # iterations to a relative change of 1e-12: half of it in each step
 EXACT_MISFIT = 1e-7  # misfit over spread of a triangle's pose that shows noise-free points, which EPOSIT then must fit
 
 
-def posit_checked(shape: Shape, image: Array, tol: float, max_iterations: int) -> tuple[Start, Mask]:
-    """`posit`, retried inside its limit, and a (b,) mask of the poses that reproduce their points.
+def posit_checked(shape: Shape, image: Array, tol: float, max_iterations: int) -> tuple[Start, Mask, Array]:
+    """`posit`, retried inside its limit; a (b,) mask of the poses that reproduce their points; how well they do.
+
+    The last is (2, b), the sums of the squared distances in x and in y between reprojections and pinhole points.
 
     The fixed point that the iteration finds need not be the pose (about one random object in a thousand), and a pose
     need not attract it. A misfit of a tenth of the points' spread tells, and for noise-free points the poses of a
@@ -31,7 +33,8 @@ def posit_checked(shape: Shape, image: Array, tol: float, max_iterations: int) -
     points_in_obj = shape.points_in_obj
     system = Orthography.of(points_in_obj, image)
     start = posit(system, tol, max_iterations)
-    misfit, spread = _misfit(points_in_obj, image, start.R, start.t)
+    squares, spread = _squares(points_in_obj, image, start.R, start.t)
+    misfit = _rms(squares, points_in_obj)
     limit = CONSISTENT_MISFIT * spread
     clear = (misfit <= DOUBTFUL_MISFIT * spread) | (system.contraction <= CONTRACTS)
     if not np.all(clear):
@@ -39,11 +42,11 @@ def posit_checked(shape: Shape, image: Array, tol: float, max_iterations: int) -
         clear |= quick & shape.sure(start.R, start.t, len(points_in_obj) * misfit**2)
     doubtful = np.flatnonzero(~clear & np.isfinite(spread))
     if not len(doubtful):
-        return start, misfit <= limit
+        return start, misfit <= limit, squares
     some = pick(image, doubtful)
     rays = np.stack((some[0], some[1], np.ones_like(some[0])), axis=1)
     ((R, t),) = p3p_poses(points_in_obj, rays / np.sqrt(np.einsum("nib,nib->nb", rays, rays))[:, None], 1)
-    exact = _misfit(points_in_obj, some, R, t)[0] <= EXACT_MISFIT * spread[doubtful]
+    exact = _rms(_squares(points_in_obj, some, R, t)[0], points_in_obj) <= EXACT_MISFIT * spread[doubtful]
     limit[doubtful[exact]] = DOUBTFUL_MISFIT * spread[doubtful[exact]]
     inside = np.all(np.hypot(some[0], some[1]) < CONVERGENT_TAN, axis=0) & (t[2] > 0.0)
     again = np.flatnonzero(~(misfit[doubtful] <= limit[doubtful]) & inside)
@@ -52,17 +55,26 @@ def posit_checked(shape: Shape, image: Array, tol: float, max_iterations: int) -
         k = forward * (system.reach / (t[2, again] + points_in_obj[0] @ forward))
         rows = doubtful[again]
         start.put(rows, posit(system.take(rows), tol, max_iterations, k, 0.5))
-        misfit, _ = _misfit(points_in_obj, image, start.R, start.t)
-    return start, misfit <= limit
+        squares[:, rows], _ = _squares(points_in_obj, pick(image, rows), pick(start.R, rows), pick(start.t, rows))
+        misfit[rows] = _rms(squares[:, rows], points_in_obj)
+    return start, misfit <= limit, squares
 
 
-def _misfit(points_in_obj: Array, image: Array, R: Array, t: Array) -> tuple[Array, Array]:
-    """RMS distance of reprojections from the pinhole points, and the RMS spread of those, each (b,)."""
+def _squares(points_in_obj: Array, image: Array, R: Array, t: Array) -> tuple[Array, Array]:
+    """Sums of the squared distances in x and y of reprojections from the pinhole points, (2, b), NaN behind the camera,
+    and the RMS spread of those, (b,)."""
     with np.errstate(all="ignore"):
         point = np.einsum("nj,ijb->inb", points_in_obj, R)
         point += t[:, None]
-        miss = point[:2] / point[2] - image
-        misfit = np.sqrt(np.einsum("anb,anb->b", miss, miss) / len(points_in_obj))
+        miss = point[:2] / point[2]
+        miss -= image
+        squares = np.einsum("anb,anb->ab", miss, miss)
         apart = image - np.add.reduce(image, axis=1, keepdims=True) / len(points_in_obj)
         spread = np.sqrt(np.einsum("anb,anb->b", apart, apart) / len(points_in_obj))
-        return np.where(np.all(point[2] > 0.0, axis=0), misfit, np.nan), spread
+        if not np.all(point[2] > 0.0):
+            squares[:, ~np.all(point[2] > 0.0, axis=0)] = np.nan
+        return squares, spread
+
+
+def _rms(squares: Array, points_in_obj: Array) -> Array:
+    return np.sqrt((squares[0] + squares[1]) / len(points_in_obj))

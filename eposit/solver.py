@@ -102,9 +102,10 @@ def _solve_linear(
     theta_centre: tuple[float, float] | None,
     out: Solution,
 ) -> None:
-    view = View.of(problem.camera, problem.points_in_obj, problem.points_px, whitening(None, len(shape.points_in_obj)))
-    back = None
-    if method != "centred" and problem.camera.lens == "perspective":
+    back, n = None, len(shape.points_in_obj)
+    view = View.of(problem.camera, problem.points_in_obj, problem.points_px, whitening(None, n))
+    plain = method != "centred" and problem.camera.lens == "perspective"
+    if plain:
         image = view.seen.transpose(1, 0, 2)  # pinhole points already, and all in front of the camera
     else:
         rays = unit_rays(problem.camera, view.seen)
@@ -119,11 +120,15 @@ def _solve_linear(
         mark(problem.status, np.ones(len(problem.status), bool), Status.COPLANAR)
         out.clear()
         return
-    start, reproduces = posit_checked(shape, image, tol, max_iterations)
+    start, reproduces, squares = posit_checked(shape, image, tol, max_iterations)
     mark(problem.status, ~start.converged, Status.NOT_CONVERGED)
     mark(problem.status, ~reproduces, Status.INCONSISTENT)
     found = start if back is None else turn_back(back, start)
-    _write(out, problem.status, found, cost(residuals(view, found.R, found.t)), len(shape.points_in_obj))
+    if plain:
+        costs = problem.camera.fx**2 * squares[0] + problem.camera.fy**2 * squares[1]
+    else:
+        costs = cost(residuals(view, found.R, found.t))
+    _write(out, problem.status, found, costs, n)
 
 
 def _solve_best(problem: Problem, shape: Shape, refined: bool, out: Solution) -> None:
