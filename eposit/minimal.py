@@ -16,7 +16,7 @@ from eposit.arrays import Array, Mask
 from eposit.camera import Camera
 from eposit.pose import Pose
 from eposit.problem import validate
-from eposit.solution import STATUS_TYPE, Solution, Status
+from eposit.solution import OK, STATUS_TYPE, Solution, Status
 
 CHUNK = 1024  # problems worked on at a time
 
@@ -120,7 +120,7 @@ def read(points_in_obj: ArrayLike, points_px: ArrayLike, camera: Camera, sigma_p
         ValueError: wrong shapes, fewer than four points, non-finite object points, or a wrong sigma.
     """
     problem, single = validate(points_in_obj, points_px, camera, sigma_px)
-    finite, count = problem.status == Status.OK, len(problem.points_in_obj)
+    finite, count = problem.status == OK, len(problem.points_in_obj)
     pattern = np.stack((np.arange(count) + 1.0, np.arange(count) ** 2.0), axis=-1)
     pixels = np.where(finite[:, None, None], problem.points_px, pattern)
     return Images(problem.points_in_obj, pixels, finite, camera, single)

@@ -17,7 +17,7 @@ from eposit.pose import Pose
 from eposit.problem import Problem, mark, validate
 from eposit.quartic import FIRST, SECOND, ZERO, critical_points, newton_step
 from eposit.refine import Refined, covariance, normal_equations, refine_poses
-from eposit.solution import Solution, Status, join
+from eposit.solution import OK, Solution, Status, join, named
 from eposit.starts import COPLANAR_CONDITION
 
 CHUNK = 32  # problems worked on at a time; each takes half a megabyte
@@ -102,7 +102,7 @@ def solve(
 
 def _solve(problem: Problem, refine: bool) -> OpnpSolution:
     status, u, v = _checked(problem)
-    b, good = len(status), np.flatnonzero(status == Status.OK)
+    b, good = len(status), np.flatnonzero(status == OK)
     system = _system(problem.points_in_obj, u[:, good].T, v[:, good].T)
     roots, pairs = critical_points(system.A, system.d)
     all_pairs = np.zeros(b, np.int64)
@@ -114,7 +114,7 @@ def _solve(problem: Problem, refine: bool) -> OpnpSolution:
     rows, first = np.unique(row[front], return_index=True)
     lowest = front[first]
     found = Refined(
-        np.full((b, 3, 3), np.nan), np.full((b, 3), np.nan), np.full(b, np.nan), np.zeros(b, int), status == ""
+        np.full((b, 3, 3), np.nan), np.full((b, 3), np.nan), np.full(b, np.nan), np.zeros(b, int), np.zeros(b, bool)
     )
     for values, chosen in ((found.R, R), (found.t, t), (found.steps, steps), (found.cost, cost)):
         values[good[rows]] = chosen[lowest]
@@ -128,9 +128,9 @@ def _solve(problem: Problem, refine: bool) -> OpnpSolution:
     return _extended(_finished(problem, found, status), candidates, all_pairs)
 
 
-def _finished(problem: Problem, found: Refined, status: NDArray[np.str_]) -> Solution:
+def _finished(problem: Problem, found: Refined, status: NDArray[np.int8]) -> Solution:
     """Poses, RMSE and covariances at the poses, as `eposit.solve` states them; NaN where the status is not OK."""
-    ok, n = status == Status.OK, len(problem.points_in_obj)
+    ok, n = status == OK, len(problem.points_in_obj)
     R, t = np.where(ok[:, None, None], found.R, np.nan), np.where(ok[:, None], found.t, np.nan)
     misses = problem.camera.project(Pose(R, t).apply(problem.points_in_obj)) - problem.points_px
     rmse = np.sqrt(np.sum(misses**2, axis=(1, 2)) / n)
@@ -142,10 +142,10 @@ def _finished(problem: Problem, found: Refined, status: NDArray[np.str_]) -> Sol
         )
         factor = 1.0 if problem.absolute else rmse[ok, None, None] ** 2 * n / (2 * n - 6)
         spread[ok] = covariance(normal) * factor
-    return Solution(status, Pose(R, t), np.where(ok, found.steps, 0), rmse, spread)
+    return Solution(named(status), Pose(R, t), np.where(ok, found.steps, 0), rmse, spread)
 
 
-def _checked(problem: Problem) -> tuple[NDArray[np.str_], Array, Array]:
+def _checked(problem: Problem) -> tuple[NDArray[np.int8], Array, Array]:
     """Status so far, and the bearings' points at depth 1, each (n, b)."""
     status = problem.status.copy()
     bearings = problem.camera.bearing(problem.points_px)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from eposit.arrays import Array, Mask
 from eposit.camera import Camera
 from eposit.refine import whitening
-from eposit.solution import STATUS_TYPE, Status
+from eposit.solution import OK, STATUSES, Status
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +21,7 @@ class Problem:
     points_in_obj: Array  # (n, 3)
     points_px: Array  # (b, n, 2), zeros where a row is not usable
     camera: Camera
-    status: NDArray[np.str_]  # (b,), OK where the row is usable so far
+    status: NDArray[np.int8]  # (b,) places in STATUSES, OK where the row is usable so far
     weights: Array  # (2, 2, n)
     absolute: bool  # whether the covariance is absolute: sigma_px was given
 
@@ -60,16 +60,16 @@ def validate(
         raise ValueError(f"points_px has shape {pixels.shape}; it must be ({len(obj)}, 2) or (b, {len(obj)}, 2)")
     single = pixels.ndim == 2
     pixels = pixels[None] if single else pixels
-    status = np.full(len(pixels), Status.OK, STATUS_TYPE)
+    status = np.full(len(pixels), OK, np.int8)
     if not np.all(np.isfinite(pixels)):
         lost = ~np.all(np.isfinite(pixels), axis=(1, 2))
-        status[lost] = Status.NON_FINITE
+        mark(status, lost, Status.NON_FINITE)
         pixels = np.where(lost[:, None, None], 0.0, pixels)
     weights = whitening(None if sigma_px is None else np.asarray(sigma_px, dtype=np.float64), len(obj))
     return Problem(obj, pixels, camera, status, weights, sigma_px is not None), single
 
 
-def mark(status: NDArray[np.str_], failed: Mask, reason: Status) -> None:
+def mark(status: NDArray[np.int8], failed: Mask, reason: Status) -> None:
     """Give rows that are still OK a reason to fail; the first reason stays."""
     if np.any(failed):
-        status[failed & (status == Status.OK)] = reason
+        status[failed & (status == OK)] = np.flatnonzero(reason == STATUSES)[0]

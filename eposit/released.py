@@ -5,6 +5,8 @@ Written from a description of its behaviour, to reproduce the paper's figures; f
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -12,7 +14,7 @@ from eposit.arrays import Array, Mask, cross, pick
 from eposit.camera import Camera
 from eposit.orthography import lengths, nearest_frame
 from eposit.problem import Problem, mark, validate
-from eposit.solution import Solution, Status, blank, join
+from eposit.solution import OK, Solution, Status, blank, join, named
 
 MAX_ITERATIONS = 50_000
 CHUNK = 4096  # problems worked on at a time
@@ -78,10 +80,10 @@ def _solve(problem: Problem, theta_centre: tuple[float, float] | None, tol: floa
     mark(status, ~np.all(np.isfinite(t), axis=0), Status.NOT_CONVERGED)
     found = blank(status, False)
     found.clear()
-    ok = np.flatnonzero(status == Status.OK)
+    ok = np.flatnonzero(status == OK)
     found.cam_from_obj.R[ok], found.cam_from_obj.t[ok] = R[..., ok].transpose(2, 0, 1), t[:, ok].T
     found.iterations[:] = iterations
-    return found
+    return replace(found, status=named(status))
 
 
 def _ratio(camera: Camera, x: Array, y: Array) -> Array:

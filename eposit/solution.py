@@ -27,6 +27,7 @@ class Status(StrEnum):
 
 
 STATUS_TYPE = np.dtype(f"<U{max(len(status) for status in Status)}")
+OK, STATUSES = 0, np.array(list(Status), STATUS_TYPE)  # solvers count with places in this list, which are small
 
 
 def _all_points() -> Mask:
@@ -67,11 +68,16 @@ class Solution:
         self.iterations[:] = 0
 
 
-def blank(status: NDArray[np.str_], weighs: bool) -> Solution:
-    """A batch to write to. weighs: whether there will be covariances; if not, they are NaN and read-only."""
-    b = len(status)
+def named(codes: NDArray[np.int8]) -> NDArray[np.str_]:
+    """Statuses of their places in `STATUSES`; read-only where all are the same, which then takes no memory."""
+    return STATUSES[codes] if np.any(codes) else np.broadcast_to(STATUSES[OK], codes.shape)
+
+
+def blank(codes: NDArray[np.int8], weighs: bool) -> Solution:
+    """A batch to write to, its status still in codes. weighs: whether there will be covariances; else they are NaN."""
+    b = len(codes)
     spread = np.empty((b, 6, 6)) if weighs else np.broadcast_to(np.nan, (b, 6, 6))
-    return Solution(status, Pose(np.empty((b, 3, 3)), np.empty((b, 3))), np.zeros(b, np.int64), np.empty(b), spread)
+    return Solution(codes, Pose(np.empty((b, 3, 3)), np.empty((b, 3))), np.zeros(b, np.int64), np.empty(b), spread)
 
 
 def join(parts: list[Solution]) -> Solution:

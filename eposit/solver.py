@@ -19,7 +19,7 @@ from eposit.problem import Problem, mark, validate
 from eposit.rectify import centred_image, inside_rim, rectify_paper, rectify_rays, unit_rays
 from eposit.refine import whitening
 from eposit.robust import solve_robust
-from eposit.solution import Solution, Status, blank
+from eposit.solution import OK, Solution, Status, blank, named
 from eposit.starts import Shape, turn_back
 
 METHODS = ("best", "centred", "eposit", "posit")
@@ -89,6 +89,7 @@ def solve(
                 _solve_best(part, shape, refine, piece)
             else:
                 _solve_linear(part, shape, method, tol, max_iterations, theta_centre, piece)
+    solution = replace(solution, status=named(problem.status))
     solution = solution.first() if single else solution
     return replace(solution, inliers=np.ones(np.shape(points_px)[:-1], bool))
 
@@ -159,9 +160,9 @@ def finish(problem: Problem, found: Minima, out: Solution) -> None:
         out.covariance[rows] = pick(spread, rows).transpose(2, 0, 1)
 
 
-def _write(out: Solution, status: NDArray[np.str_], found: Start, costs: Array, n: int) -> NDArray[np.int64] | None:
+def _write(out: Solution, status: NDArray[np.int8], found: Start, costs: Array, n: int) -> NDArray[np.int64] | None:
     """Write poses and RMSE where the status is OK; those rows, None for all."""
-    ok = status == Status.OK
+    ok = status == OK
     if np.all(ok):
         out.cam_from_obj.R[:], out.cam_from_obj.t[:] = found.R.transpose(2, 0, 1), found.t.T
         np.sqrt(costs / n, out=out.reprojection_rmse_px)
@@ -176,7 +177,7 @@ def _write(out: Solution, status: NDArray[np.str_], found: Start, costs: Array, 
     return rows
 
 
-def _mark_rays(status: NDArray[np.str_], rays: Array, forward: bool) -> None:
+def _mark_rays(status: NDArray[np.int8], rays: Array, forward: bool) -> None:
     """Outside the lens where there is no ray; beyond the field of POSIT where it does not point forward."""
     z = np.minimum.reduce(rays[:, 2], axis=0)
     mark(status, np.isnan(z), Status.OUTSIDE_LENS)
