@@ -39,7 +39,7 @@ def _all_points() -> Mask:
 class Solution:
     """Result of `solve` for one problem, or for a batch of b problems (then every field has a leading axis b)."""
 
-    status: Any  # a Status, or a (b,) array of their strings
+    status: Any  # a Status, or a (b,) array of their strings, which may be read-only
     cam_from_obj: Pose  # R (3, 3) and t (3,) in the unit of points_in_obj
     iterations: Any  # of the linear start and the refinement together
     reprojection_rmse_px: Any  # root of the mean squared distance between image points and reprojections, px

@@ -11,6 +11,7 @@ import numpy as np
 from eposit.arrays import Array, Mask
 
 RESAMPLES = 1000
+FEW = 200  # resamples where a table has many scores: an interval's ends are good to a tenth of its length
 LEVEL = 0.95
 NORMAL_97 = 1.959963984540054  # quantile of 0.975
 CHUNK_VALUES = 4_000_000  # resampled values held at once
@@ -81,7 +82,7 @@ def rate(happened: Mask) -> Interval:
     """
     if np.all(happened) or not np.any(happened):
         return wilson(happened.ravel())
-    return bootstrap(happened.astype(np.float64), mean, resamples=200)
+    return bootstrap(happened.astype(np.float64), mean, resamples=FEW)
 
 
 def wilson(happened: Mask) -> Interval:

@@ -8,13 +8,13 @@ from functools import partial
 import numpy as np
 
 from eposit.arrays import Array
-from pipelines.intervals import Interval, bootstrap, median, percent, percentile95, rate
+from pipelines.intervals import FEW, Interval, bootstrap, median, percent, percentile95, rate
 from pipelines.paper import simulation as sim
 from pipelines.paper.parts import Claim, Drawing, Section, Table, Verdict, held
 from pipelines.paper.plots import boxes
 from pipelines.paper.problems import NORMAL_MEDIAN, OBJECT, bounds, information
 
-FEW = 5  # draws for OPnP, of which a pose takes milliseconds
+OPNP_DRAWS = 5  # for OPnP, of which a pose takes milliseconds
 STATISTICS: dict[str, Callable[[Array], Array]] = {"median": median, "95 %": percentile95}
 HEAD = (
     "solver",
@@ -66,7 +66,7 @@ def fisheye(seeds: int) -> Section:
 
 
 def _outcomes(lens: str, solvers: dict[str, sim.Estimate], seeds: int) -> dict[str, sim.Outcome]:
-    few, many = sim.draws(lens, min(FEW, seeds)), sim.draws(lens, seeds)
+    few, many = sim.draws(lens, min(OPNP_DRAWS, seeds)), sim.draws(lens, seeds)
     found = {name: sim.outcome(few if name == "OPnP" else many, call) for name, call in solvers.items()}
     return found | {f"{name}, the draws of OPnP": sim.outcome(few, solvers[name]) for name in PEERS}
 
@@ -78,7 +78,7 @@ def _items(
     for name, outcome in found.items():
         failures = [percent(rate(mask.T)) for mask in (outcome.failed, outcome.star)]
         for label, statistic in STATISTICS.items():
-            cells = (bootstrap(_by_pose(np.abs(outcome.error[..., k])), statistic, resamples=200) for k in range(6))
+            cells = (bootstrap(_by_pose(np.abs(outcome.error[..., k])), statistic, resamples=FEW) for k in range(6))
             rows.append((name, label, *(cell.text(3) for cell in cells), *failures))
     shown = {name: found[name].error.reshape(-1, 6) for name in SHOWN if name in found}
     return (
@@ -99,7 +99,7 @@ def _against_bound(lens: str, found: dict[str, sim.Outcome]) -> Table:
     rows: list[tuple[str, ...]] = []
     for name, outcome in found.items():
         ratio = np.abs(outcome.vector.reshape(len(outcome.failed), -1, 6)) / bound
-        cells = (bootstrap(_by_pose(ratio[..., k]), median, resamples=200) for k in range(6))
+        cells = (bootstrap(_by_pose(ratio[..., k]), median, resamples=FEW) for k in range(6))
         rows.append((name, *(cell.text(3) for cell in cells)))
     return Table(
         f"Median of |error| over the frame's Cramer-Rao bound; {NORMAL_MEDIAN:.4f} reaches it", head, tuple(rows),
@@ -114,7 +114,7 @@ def _by_pose(values: Array) -> Array:
 
 def _text(outcome: sim.Outcome) -> str:
     rx, ry, rz = (float(np.nanmedian(np.abs(outcome.error[..., k]))) for k in range(3))
-    z = bootstrap(_by_pose(np.abs(outcome.error[..., 5])), median, resamples=200)
+    z = bootstrap(_by_pose(np.abs(outcome.error[..., 5])), median, resamples=FEW)
     return f"{rx:.3f}/{ry:.3f}/{rz:.3f} deg, z {z.text(3)} mm"
 
 

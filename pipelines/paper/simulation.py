@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -85,24 +86,18 @@ def outcome(problem: Draws, estimate: Estimate) -> Outcome:
     )
 
 
-def equations(problem: Draws) -> Solution:
-    """EPOSIT by the paper's equations, its camera, theta from the image centre."""
-    return eposit.solve(OBJECT, problem.pixels, problem.paper, "eposit", theta_centre=CENTRE_PX)
+def equations(problem: Draws, theta_centre: tuple[float, float] | None = CENTRE_PX) -> Solution:
+    """EPOSIT by the paper's equations, its camera, theta from the image centre; from the principal point if None."""
+    return eposit.solve(OBJECT, problem.pixels, problem.paper, "eposit", theta_centre=theta_centre)
 
 
-def equations_from_principal_point(problem: Draws) -> Solution:
-    """The same with theta from the true principal point."""
-    return eposit.solve(OBJECT, problem.pixels, problem.paper, "eposit")
+def as_released(problem: Draws, theta_centre: tuple[float, float] | None = CENTRE_PX) -> Solution:
+    """The released code's behaviour, likewise."""
+    return released.solve(OBJECT, problem.pixels, problem.paper, theta_centre=theta_centre)
 
 
-def as_released(problem: Draws) -> Solution:
-    """The released code's behaviour, the paper's camera, theta from the image centre."""
-    return released.solve(OBJECT, problem.pixels, problem.paper, theta_centre=CENTRE_PX)
-
-
-def as_released_from_principal_point(problem: Draws) -> Solution:
-    """The same with theta from the true principal point."""
-    return released.solve(OBJECT, problem.pixels, problem.paper)
+equations_from_principal_point = functools.partial(equations, theta_centre=None)
+as_released_from_principal_point = functools.partial(as_released, theta_centre=None)
 
 
 def eposit_exact(problem: Draws) -> Solution:

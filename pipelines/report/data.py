@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from datasets.schema import COMPONENTS
 from eposit.arrays import Array, Mask
-from pipelines.intervals import bootstrap, median, percentile95, rate
+from pipelines.intervals import FEW, bootstrap, median, percentile95, rate
 
 ERRORS = {
     "rotation_error_deg": "rotation, deg",
@@ -24,7 +24,6 @@ ERRORS = {
     "t_error_relative": "translation, relative",
     "reprojection_rmse_px": "reprojection, px",
 }
-RESAMPLES = 200  # ends of an interval are then good to a tenth of its length
 SETTING = ("solver", "points", "camera", "use")
 
 
@@ -72,7 +71,7 @@ def score_rows(found: list[Series], cameras: dict[int, str]) -> list[dict[str, A
             row |= {"failed_rate": rate(failed), "star_rate": rate(star)}
             for column in ERRORS:
                 values = np.where(failed, np.nan, np.abs(item.errors[column][by_frame]))
-                both = [bootstrap(values, statistic, resamples=RESAMPLES) for statistic in (median, percentile95)]
+                both = [bootstrap(values, statistic, resamples=FEW) for statistic in (median, percentile95)]
                 row[column] = None if np.isnan(both[0].value) else both
             rows.append(row)
     return rows
