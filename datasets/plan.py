@@ -10,14 +10,16 @@ from enum import IntEnum
 import numpy as np
 
 from datasets.errors import UserError
-from datasets.listed import Listed
-from datasets.recipe import CameraSpec, Recipe
-from datasets.scatter import MAX_TRIES, Scatter
-from datasets.trajectory import Helix
-from datasets.views import FieldAngles, View, hand_held
+from datasets.recipe.cameras import CameraSpec
+from datasets.recipe.model import Recipe
+from datasets.trajectories.field import FieldAngles
+from datasets.trajectories.helix import Helix
+from datasets.trajectories.listed import Listed
+from datasets.trajectories.scatter import MAX_TRIES, Scatter
+from datasets.trajectories.view import View, hand_held
 from eposit import Pose
-from render.motion import Rate
-from render.regimes import SensorModel
+from render.sensor.motion import Rate
+from render.sensor.presets import SensorModel
 
 
 class Stream(IntEnum):

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from eposit.arrays import Array, Mask
 from eposit.camera import Camera
-from eposit.refine import whitening
+from eposit.refine.weights import whitening
 from eposit.solution import OK, STATUSES, Status
 
 

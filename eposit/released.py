@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from eposit.arrays import Array, Mask, cross, pick
 from eposit.camera import Camera
-from eposit.orthography import lengths, nearest_frame
+from eposit.posit.orthography import lengths, nearest_frame
 from eposit.problem import Problem, mark, validate
 from eposit.solution import OK, Solution, Status, blank, join, named
 

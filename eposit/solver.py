@@ -9,18 +9,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eposit.arrays import Array, Mask, pick
-from eposit.best import best_poses
 from eposit.camera import Camera
-from eposit.descent import Minima
-from eposit.linear import posit_checked
-from eposit.normal import View, cost, residuals
-from eposit.posit import Start
+from eposit.linear_methods import posit_checked
+from eposit.posit.iteration import Start
 from eposit.problem import Problem, mark, validate
-from eposit.rectify import centred_image, inside_rim, rectify_paper, rectify_rays, unit_rays
-from eposit.refine import whitening
+from eposit.rays import centred_image, inside_rim, rectify_paper, rectify_rays, unit_rays
+from eposit.refine.minimise import Minima
+from eposit.refine.reprojection import View, cost, residuals
+from eposit.refine.weights import whitening
 from eposit.robust import solve_robust
+from eposit.search import best_poses
+from eposit.shape import Shape
 from eposit.solution import OK, Solution, Status, blank, named
-from eposit.starts import Shape, turn_back
+from eposit.starts import turn_back
 
 METHODS = ("best", "centred", "eposit", "posit")
 CHUNK = 16384  # problems worked on at a time, fewer if they have many points: NumPy's calls spread over them

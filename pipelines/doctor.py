@@ -63,8 +63,8 @@ def _lab() -> tuple[str, bool, str]:
 
 def _render() -> tuple[str, bool, str]:
     from datasets.plan import plan
-    from datasets.recipe import load_recipe
-    from render.master import render_master
+    from datasets.recipe.model import load_recipe
+    from render.frame import render_master
 
     recipe, _ = load_recipe("smoke")
     frame = plan(recipe)[0]

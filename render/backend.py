@@ -1,4 +1,4 @@
-"""The one door to Mitsuba and Dr.Jit: finds a usable LLVM or GPU, fixes the variant, registers our sensor.
+"""The one door to Mitsuba and Dr.Jit: finds a usable LLVM or GPU and fixes the variant.
 
 Dr.Jit compiles its kernels with an LLVM library that it loads at run time. Versions below 19 abort the whole process
 at the first `maximum` ("Cannot select: fmaximum"), so the library is found and checked before Dr.Jit is imported.
@@ -76,7 +76,7 @@ def cuda_present() -> bool:
 
 @functools.cache
 def load() -> Any:
-    """Mitsuba with its variant fixed for this process and our sensor registered.
+    """Mitsuba with its variant fixed for this process.
 
     `EPOSIT_VARIANT` chooses between llvm_ad_mono and cuda_ad_mono; without it a CUDA GPU is used where there is one.
 
@@ -98,9 +98,6 @@ def load() -> Any:
         raise BackendError(f"Mitsuba already runs {mi.variant()!r} here; start a new process for {variant!r}")
     mi.set_variant(variant)
     mi.set_log_level(mi.LogLevel.Error)
-    from render.sensor import register_sensor
-
-    register_sensor(mi, jit())
     return mi
 
 

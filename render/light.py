@@ -12,7 +12,8 @@ from typing import Annotated
 import numpy as np
 
 from eposit.arrays import Array
-from render.target import Target
+from render.targets.chessboard import Target
+from render.targets.disc_shade import blocked_share
 
 GRID_SHARE = 0.01  # spacing of the map of the light in squares: 1 mm on the paper's board, a third of the penumbra
 LAMP_SAMPLES = 48  # lamp positions along each side for the circle's shadow
@@ -144,14 +145,3 @@ def lamp_irradiance(target: Target, light: Light, points: Array, samples: int, *
             value[across * across + down * down < target.circle_radius_mm**2] = 0.0
         total += value
     return total
-
-
-def blocked_share(distance: Array, radius: float, height: float) -> Array:
-    """Share of an even surrounding's light that a disc blocks at a point below its plane.
-
-    distance: of the point from the disc's axis, any shape. All lengths in one unit.
-    Source:
-        Howell, catalogue of configuration factors, B-13: a differential element to a parallel disc.
-    """
-    a2, r2, h2 = distance**2, radius**2, height**2
-    return 0.5 * (1.0 - (a2 + h2 - r2) / np.sqrt((a2 + h2 + r2) ** 2 - 4.0 * a2 * r2))

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import pytest
 
-from datasets.store import open_dataset
+from datasets.store.dataset import open_dataset
+from datasets.store.verify import verify
 from pipelines.cli import main
-from pipelines.verify import verify
 
 pytest.register_assert_rewrite("tests.wrong_input")
 from tests.wrong_input import Place  # noqa: E402

@@ -8,11 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datasets.plan import Frame, plan
-from datasets.recipe import CameraSpec, Recipe
+from datasets.recipe.cameras import CameraSpec
+from datasets.recipe.model import Recipe
 from eposit import Camera
 from pipelines.detection import detect_points
-from render.develop import Shot, develop
-from render.master import Image, Master, Region, lens_coverage, render_master
+from render.analytic.image_circle import lens_coverage
+from render.frame import Master, render_master
+from render.region import Image, Region
+from render.sensor.develop import Shot, develop
 
 
 def chosen_poses(recipe: Recipe, poses: int) -> list[int]:

@@ -9,11 +9,18 @@ from rich.console import Console
 from rich.progress import Progress
 
 from datasets.errors import UserError
-from datasets.recipe import Recipe
-from datasets.store import write_text
-from pipelines.bench import blender, equal, finders, frames, growth, memory, profile, rays, solver, whole
+from datasets.recipe.model import Recipe
+from datasets.store.dataset import write_text
+from pipelines.bench import blender, memory, profile
+from pipelines.bench import detection as finders
+from pipelines.bench import end_to_end as whole
+from pipelines.bench import equal_accuracy as equal
+from pipelines.bench import frame as frames
+from pipelines.bench import primary_rays as rays
+from pipelines.bench import scaling as growth
+from pipelines.bench import solvers as solver
 from pipelines.bench.machine import facts, one_line
-from pipelines.bench.rows import Row, markdown, terminal
+from pipelines.bench.table import Row, markdown, terminal
 
 Part = Callable[[Recipe, int], Iterator[Row]]
 OPTIONAL = ("blender",)  # needs what setup does not install: measured only where it is asked for

@@ -8,12 +8,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from datasets.plan import frame_count, shard_count
-from datasets.recipe import Recipe
-from datasets.store import Dataset
-from pipelines import detect, generate
+from datasets.recipe.model import Recipe
+from datasets.store.dataset import Dataset
 from pipelines.bench.cases import scaled
-from pipelines.bench.rows import Row, noted
+from pipelines.bench.table import Row, noted
 from pipelines.detection import Detector
+from pipelines.stages import detect, generate
 
 PART = "memory"
 SETTLED = 200  # frames after which kernels, maps and pools are all there

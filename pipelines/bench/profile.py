@@ -13,18 +13,18 @@ import numpy as np
 
 import eposit
 from datasets.plan import Frame
-from datasets.recipe import Recipe
+from datasets.recipe.model import Recipe
+from datasets.store.images import decode_png, encode_png
+from datasets.store.linear_images import write_master
 from pipelines.bench.cases import chosen_frames, image_of, master_of
-from pipelines.bench.rays import NAME, primary_rays
-from pipelines.bench.rows import Row, compared
+from pipelines.bench.primary_rays import NAME, primary_rays
+from pipelines.bench.table import Row, compared
 from pipelines.bench.timing import in_turn
-from pipelines.board import CLASSIC_FLAGS, find_board, textured_region
-from pipelines.circle import find_circle
-from pipelines.corners import refine_corners
 from pipelines.detection import CIRCLE_CLEARANCE, SUBPIX_STOP, SUBPIX_WINDOW, detect_points
-from pipelines.surface import BoardMap, grid
-from render.develop import decode_png, encode_png
-from render.master import write_master
+from pipelines.detection.board_map import BoardMap, grid
+from pipelines.detection.circle import find_circle
+from pipelines.detection.corners import refine_corners
+from pipelines.detection.finders import CLASSIC_FLAGS, find_board, textured_region
 
 PART = "profile"
 Call = Callable[[], Any]

@@ -14,8 +14,8 @@ def load(recipe: str, regime: str | None) -> tuple[Any, str]:
     Raises:
         UserError: no such recipe or regime, or a wrong one.
     """
-    from datasets.override import with_regime
-    from datasets.recipe import load_recipe, parse_recipe
+    from datasets.recipe.model import load_recipe, parse_recipe
+    from datasets.recipe.override import with_regime
 
     loaded, text = load_recipe(recipe)
     if regime is None:
@@ -31,7 +31,7 @@ def begin(recipe: str, out: Path, regime: str | None, masters: Path | None, cons
         UserError: a recipe, folder or plan that is not usable.
     """
     from datasets.plan import plan
-    from datasets.store import claim, open_dataset
+    from datasets.store.dataset import claim, open_dataset
 
     loaded, text = load(recipe, regime)
     plan(loaded)
@@ -39,7 +39,7 @@ def begin(recipe: str, out: Path, regime: str | None, masters: Path | None, cons
         open_dataset(masters)  # before anything is written
     dataset = claim(out, loaded, text)
     if masters is not None:
-        from pipelines.borrow import borrow_masters
+        from datasets.store.reuse import borrow_masters
 
         taken, lacking = borrow_masters(dataset, masters)
         console.print(f"masters: {taken} of {lacking} taken from {masters}; the rest is rendered")
@@ -52,6 +52,6 @@ def opened(folder: Path) -> Any:
     Raises:
         UserError: there is none.
     """
-    from datasets.store import open_dataset
+    from datasets.store.dataset import open_dataset
 
     return open_dataset(folder)

@@ -22,10 +22,11 @@ def run(
     quiet: o.Quiet = False,
 ) -> None:
     """Every stage: generate, detect, estimate, score, report."""
-    from pipelines import stages
+    from pipelines.stages import run as stages
+    from pipelines.stages.settings import RUN_SETTINGS, settings_of
 
     console = Console(quiet=quiet)
-    settings = [*stages.RUN_SETTINGS, *stages.settings_of(solver or [])]
+    settings = [*RUN_SETTINGS, *settings_of(solver or [])]
     dataset = begin(recipe, out, regime, masters, console)
     stages.run_generate(dataset, workers, console)
     stages.run_detect(dataset, workers, console)
@@ -50,7 +51,7 @@ def generate(
     quiet: o.Quiet = False,
 ) -> None:
     """Render images with their truth."""
-    from pipelines import stages
+    from pipelines.stages import run as stages
 
     console = Console(quiet=quiet)
     stages.run_generate(begin(recipe, out, regime, masters, console), workers, console)
@@ -60,7 +61,7 @@ def detect(
     folder: o.Folder, detector: o.DetectorName = "edge-fit", workers: o.Workers = 1, quiet: o.Quiet = False
 ) -> None:
     """Find corners and circle in the images; each detector's points stay beside the others'."""
-    from pipelines import stages
+    from pipelines.stages import run as stages
 
     stages.run_detect(opened(folder), workers, Console(quiet=quiet), detector)
 
@@ -80,9 +81,8 @@ def estimate(
     quiet: o.Quiet = False,
 ) -> None:
     """Estimate poses with a solver, or with your own function; nothing is rendered again."""
-    from pipelines import stages
-    from pipelines.estimate import Setting
-    from pipelines.systems import System
+    from pipelines.stages import run as stages
+    from pipelines.stages.settings import Setting, System
 
     setting = Setting("best" if solver is None else solver, points, camera, use, noise_px, draws, detector)
     console = Console(quiet=quiet)
@@ -103,8 +103,8 @@ def score(
     quiet: o.Quiet = False,
 ) -> None:
     """Score every estimate, and the poses of a file, against the truth."""
-    from pipelines import stages
-    from pipelines.systems import System
+    from pipelines.stages import run as stages
+    from pipelines.stages.settings import System
 
     if (poses is None) != (name is None):
         raise UserError("--poses and --name go together; give a file of poses and what to call them, or neither")

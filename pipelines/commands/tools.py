@@ -16,7 +16,7 @@ from pipelines.commands.opening import load, opened
 
 def verify(folder: o.Folder) -> None:
     """Check every shard and master, and print the hash of the content."""
-    from pipelines.verify import verify as check
+    from datasets.store.verify import verify as check
 
     digest, problems = check(opened(folder))
     if problems:
@@ -69,7 +69,7 @@ def paper(
 def recipes() -> None:
     """List the recipes that come with the package."""
     from datasets.plan import frame_count
-    from datasets.recipe import load_recipe, recipe_names
+    from datasets.recipe.model import load_recipe, recipe_names
 
     table = Table(box=None)
     for title in ("name", "frames", "description"):
@@ -82,9 +82,9 @@ def recipes() -> None:
 
 def describe(recipe: o.ShownRecipe = None) -> None:
     """Every key of a recipe with its meaning: its defaults and the sensor's regimes, or a recipe's values."""
-    from datasets.recipe import describe as keys
-    from datasets.recipe import load_recipe, values
-    from render.regimes import regime_rows, regimes
+    from datasets.recipe.model import describe as keys
+    from datasets.recipe.model import load_recipe, values
+    from render.sensor.presets import regime_rows, regimes
 
     rows = [(key, default, meaning) for key, default, meaning in keys()]
     if recipe:

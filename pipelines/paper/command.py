@@ -11,10 +11,10 @@ from rich.progress import Progress
 from threadpoolctl import threadpool_limits
 
 from datasets.errors import UserError
-from datasets.store import refused, write_text
+from datasets.store.dataset import refused, write_text
 from pipelines.doctor import versions
-from pipelines.engine import check_workers
-from pipelines.paper.parts import Claim, Drawing, Section
+from pipelines.engines.local import check_workers
+from pipelines.paper.claims import Claim, Drawing, Section
 
 PAGE, CLAIMS = "paper.html", "claims.md"
 IMAGE_PARTS = ("images", "wide", "experiment")
@@ -24,10 +24,10 @@ MAX_SEEDS = 1000
 
 def parts(out: Path, seeds: int, workers: int, tell: Callable[[str], None]) -> dict[str, Measure]:
     """The parts by name, in the order of the page."""
-    from pipelines.paper import comparison, precision, sensitivity
     from pipelines.paper.beyond import beyond
     from pipelines.paper.experiment import measure as experiment
-    from pipelines.paper.images import images, wide
+    from pipelines.paper.rendered import images, wide
+    from pipelines.paper.simulation import comparison, precision, sensitivity
 
     return {
         "precision": lambda: [precision.precision(seeds)],

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from datasets.trajectory import Helix
+from datasets.trajectories.helix import Helix
 from eposit import Camera, Pose, Solution
 from eposit.arrays import Array, Mask
 from eposit.pose import rotation_error_vector, rotation_from_vector
-from eposit.refine import covariance, normal_equations, whitening
-from render.target import Target
+from eposit.refine.weights import covariance, normal_equations, whitening
+from render.targets.chessboard import Target
 
 OBJECT = np.array([(0.0, 0.0, 0.0), (200.0, 0.0, 0.0), (0.0, 200.0, 0.0), (0.0, 0.0, -50.0)])  # the paper's, mm
 SIGMA_PX = 0.4  # the paper's noise

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from datasets.schema import COMPONENTS
 from eposit.arrays import Array, Mask
-from pipelines.intervals import FEW, bootstrap, median, percentile95, rate
+from pipelines.statistics import FEW, bootstrap, median, percentile95, rate
 
 ERRORS = {
     "rotation_error_deg": "rotation, deg",

@@ -8,10 +8,10 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
+from datasets.store.images import encode_png
 from eposit.arrays import Array
-from pipelines.drawing import STYLE, svg
 from pipelines.report.data import ERRORS, Series
-from render.develop import encode_png
+from pipelines.report.svg import STYLE, svg
 
 BOXES = ("rx_error_deg", "ry_error_deg", "rz_error_deg", "tx_error_mm", "ty_error_mm", "tz_error_mm")
 

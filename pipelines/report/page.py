@@ -8,16 +8,16 @@ from typing import Any
 import jinja2
 import numpy as np
 
+from datasets.rows import decode_image, of_detector, points_by_frame
 from datasets.schema import COMPONENTS
-from datasets.store import RECIPE_FILE, Dataset, write_text
+from datasets.store.dataset import RECIPE_FILE, Dataset, write_text
 from eposit.arrays import Array
 from pipelines.detection import Detector
 from pipelines.doctor import versions
-from pipelines.intervals import Interval
 from pipelines.report import figures
 from pipelines.report.data import ERRORS, normalised_rows, score_rows, series
 from pipelines.report.points import field_rows, point_errors, tilt_rows
-from pipelines.rows import decode_image, of_detector, points_by_frame
+from pipelines.statistics import Interval
 
 REPORT = "report.html"
 GALLERY = 15  # pictures at most

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from datasets.store import Dataset
+from datasets.rows import covariances_by_frame, of_detector, points_by_frame
+from datasets.store.dataset import Dataset
 from eposit.arrays import Array, Mask
-from pipelines.rows import covariances_by_frame, of_detector, points_by_frame
 
 STEEP_DEG = 45.0
 ANGLE_STEP_DEG = 15.0  # of the field-angle table; each row is centred on a multiple

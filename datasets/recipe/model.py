@@ -1,0 +1,173 @@
+"""A recipe: everything that decides a dataset's content, from one TOML file, strictly typed."""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+import json
+import tomllib
+from collections.abc import Iterator
+from dataclasses import asdict
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from datasets.errors import UserError
+from datasets.recipe.cameras import CameraSpec
+from datasets.recipe.cameras import assumed_camera as assumed_camera
+from datasets.recipe.describe import Key, keys_of, sentence, values_of
+from datasets.recipe.quality import QUALITIES, QualityName, quality_text
+from datasets.trajectories import TRAJECTORIES, Trajectory
+from datasets.trajectories.helix import Helix
+from render.light import Light
+from render.sensor.presets import DEFAULT_REGIME, SensorModel, regimes
+from render.targets.chessboard import CIRCLE, Target
+
+RECIPES = resources.files("datasets") / "recipes"
+SUFFIX = ".toml"
+
+
+class Recipe(BaseModel):
+    """What a recipe file holds."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$", description="name of the dataset")]
+    description: Annotated[str, Field(description="what it is for, one line")] = ""
+    seed: Annotated[int, Field(ge=0, lt=2**63, description="seed of everything random; 0 is a seed")] = 0
+    quality: Annotated[QualityName, Field(description=f"how finely edges are rendered: {quality_text()}")] = "standard"
+    samples: Annotated[
+        int | None,
+        Field(
+            ge=1, le=65536, description="cells of a pixel where edges meet, a square number; the quality's if left out"
+        ),
+    ] = None
+    shard_frames: Annotated[int, Field(ge=1, le=10000, description="frames in one shard")] = 10
+    allow_cropped: Annotated[bool, Field(description="whether target points may lie outside the image")] = False
+    four: Annotated[
+        tuple[tuple[int, int] | str, ...] | None,
+        Field(
+            description='points of `--use four`, M0 first: inner corners [column, row] from 0, or "circle"; '
+            "the outermost corners of the first row and column and the circle if left out"
+        ),
+    ] = None
+    target: Annotated[Target, Field(description="the board and its circle")] = Target()
+    light: Annotated[Light, Field(description="lamp, surrounding, background")] = Light()
+    sensor: Annotated[SensorModel, Field(description="linear light to 8 bits")] = SensorModel()
+    trajectory: Annotated[Trajectory, Field(discriminator="kind", description="the target's path")] = Helix()
+    cameras: Annotated[tuple[CameraSpec, ...], Field(min_length=1, description="the cameras; each sees every pose")]
+
+    @field_validator("samples")
+    @classmethod
+    def _square(cls, samples: int | None) -> int | None:
+        if samples is not None and round(samples**0.5) ** 2 != samples:
+            raise ValueError(f"samples is {samples}; it must be a square number such as 16, 64 or 256")
+        return samples
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Recipe:
+        names = [camera.name for camera in self.cameras]
+        if len(set(names)) < len(names):
+            raise ValueError(f"cameras are named {', '.join(names)}; give each its own name")
+        indices = self.four_indices()
+        if len(indices) != 4 or len(set(indices)) != 4:
+            raise ValueError(
+                f"four has {len(indices)} points, {len(set(indices))} of them different; give four different ones"
+            )
+        return self
+
+    def sample_count(self) -> int:
+        """`samples`, or the quality's."""
+        return QUALITIES[self.quality].samples if self.samples is None else self.samples
+
+    def four_indices(self) -> list[int]:
+        """Rows in `Target.points` of the four points, M0 first."""
+        across, down = self.target.inner
+        four = ((0, 0), (across - 1, 0), (0, down - 1), CIRCLE) if self.four is None else self.four
+        return [self.target.index(point) for point in four]
+
+    def __hash__(self) -> int:
+        return hash(self.digest())
+
+    def digest(self) -> str:
+        """Hash of everything that decides the content; name and description do not, nor how samples are chosen."""
+        content = self.model_dump(mode="json", exclude={"name", "description", "quality"})
+        content["samples"] = self.sample_count()
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def parse_recipe(text: str, source: str) -> Recipe:
+    """The recipe in a TOML text. `source` names it in messages.
+
+    Raises:
+        UserError: not TOML, an unknown key (with the nearest known one), a wrong type or a value out of range.
+    """
+    try:
+        return Recipe.model_validate_json(json.dumps(_completed(tomllib.loads(text), source)))
+    except UserError:
+        raise
+    except tomllib.TOMLDecodeError as error:
+        raise UserError(f"{source} is not valid TOML: {error}; mend that line") from None
+    except (TypeError, ValueError) as error:
+        if isinstance(error, ValidationError):
+            raise UserError(f"{source}: {sentence(error, Recipe)}") from None
+        raise UserError(
+            f"{source} holds a value that a recipe cannot take: {error}; use numbers, texts and lists"
+        ) from None
+
+
+def _completed(data: dict[str, Any], source: str) -> dict[str, Any]:
+    """A recipe's data with the trajectory's kind and the values of the sensor's regime."""
+    path, sensor = data.get("trajectory"), data.get("sensor")
+    if isinstance(path, dict):
+        kind = path.setdefault("kind", "helix")
+        if kind not in list(TRAJECTORIES):
+            raise UserError(f"{source}: trajectory kind is {kind!r}; choose one of {', '.join(TRAJECTORIES)}")
+    if isinstance(sensor, dict):
+        regime = sensor.pop("regime", DEFAULT_REGIME)
+        if regime not in list(regimes()):
+            raise UserError(f"{source}: sensor regime is {regime!r}; choose one of {', '.join(regimes())}")
+        data["sensor"] = asdict(regimes()[regime]) | sensor
+    return data
+
+
+def load_recipe(name: str) -> tuple[Recipe, str]:
+    """A recipe and its text, by path or by the name of one that comes with the package.
+
+    Raises:
+        UserError: no such file or name, or a wrong recipe.
+    """
+    if name.endswith(SUFFIX) or "/" in name:
+        try:
+            text = Path(name).read_text(encoding="utf-8-sig")
+        except (OSError, UnicodeDecodeError) as error:
+            reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
+            raise UserError(f"cannot read recipe {name}: {reason}; give a .toml file, or one of {_known()}") from None
+        return parse_recipe(text, name), text
+    if name not in recipe_names():
+        close = difflib.get_close_matches(name, recipe_names(), n=1)
+        hint = f"did you mean {close[0]}? " if close else ""
+        raise UserError(f"unknown recipe {name!r}; {hint}known ones are {_known()}, or give a path to a .toml file")
+    text = (RECIPES / f"{name}{SUFFIX}").read_text(encoding="utf-8")
+    return parse_recipe(text, f"recipe {name}"), text
+
+
+def recipe_names() -> list[str]:
+    """Names of the recipes that come with the package."""
+    return sorted(path.name.removesuffix(SUFFIX) for path in RECIPES.iterdir() if path.name.endswith(SUFFIX))
+
+
+def describe() -> Iterator[Key]:
+    """Key, default and meaning of every key of a recipe, from the same fields that validate it."""
+    return keys_of(Recipe)
+
+
+def values(recipe: Recipe) -> dict[str, str]:
+    """Key to value for every key of `describe` that the recipe takes."""
+    return values_of(recipe)
+
+
+def _known() -> str:
+    return ", ".join(recipe_names())

@@ -1,0 +1,114 @@
+"""Columns to tables and back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from datasets.errors import UserError
+from datasets.schema import ESTIMATES
+from datasets.store.images import decode_png
+from eposit import Camera, Pose, Solution
+from eposit.arrays import Array
+from render.targets.chessboard import Target
+
+LEAST_SIDE_PX = 16
+
+
+def table(schema: pa.Schema, columns: dict[str, Any]) -> pa.Table:
+    """A table of `schema` from a mapping of columns."""
+    return pa.table(
+        [pa.array(columns[field.name], type=field.type, from_pandas=False) for field in schema], schema=schema
+    )
+
+
+def pose_columns(R: Array, t: Array) -> dict[str, Array]:
+    """Quaternion and position columns of (b, 3, 3) and (b, 3); NaN poses give NaN."""
+    finite = np.all(np.isfinite(R), axis=(1, 2))
+    quaternion = np.full((len(t), 4), np.nan)
+    if np.any(finite):
+        quaternion[finite] = Pose(R[finite], t[finite]).quaternion
+    columns = {f"q_{axis}": quaternion[:, i] for i, axis in enumerate("wxyz")}
+    return columns | {f"t_{axis}_mm": t[:, i] for i, axis in enumerate("xyz")}
+
+
+def estimate_rows(
+    frame_ids: Sequence[int], draws: Sequence[int], key: tuple[str, str, str, str], found: Solution, points: int
+) -> pa.Table:
+    """Rows of `estimates` from b solutions. key: solver, points, camera and use. points: how many the solver had."""
+    b = len(frame_ids)
+    columns = {
+        "frame_id": frame_ids,
+        **{name: [value] * b for name, value in zip(("solver", "points", "camera", "use"), key, strict=True)},
+        "draw": draws,
+        "status": found.status,
+        "n_points": np.full(b, points),
+        **pose_columns(found.cam_from_obj.R, found.cam_from_obj.t),
+        "iterations": found.iterations,
+        "reprojection_rmse_px": found.reprojection_rmse_px,
+        "covariance": list(found.covariance.reshape(b, 36)),
+    }
+    return table(ESTIMATES, columns)
+
+
+def poses(rows: pa.Table) -> Pose:
+    """(b,) poses from quaternion and position columns; NaN rows stay NaN."""
+    quaternion = np.stack([rows[f"q_{axis}"].to_numpy() for axis in "wxyz"], axis=1)
+    t = np.stack([rows[f"t_{axis}_mm"].to_numpy() for axis in "xyz"], axis=1)
+    finite = np.all(np.isfinite(quaternion), axis=1)
+    R = np.full((len(t), 3, 3), np.nan)
+    if np.any(finite):
+        R[finite] = Pose.from_quaternion(quaternion[finite], t[finite]).R
+    return Pose(R, t)
+
+
+def camera_of(row: dict[str, Any]) -> Camera:
+    """The true camera of a row of `frames`."""
+    coefficients = tuple(row[f"k{i}"] for i in range(1, 5)) if row["lens"] == "kannala_brandt" else ()
+    return Camera(
+        lens=row["lens"],
+        **{name: row[f"{name}_px"] for name in ("fx", "fy", "cx", "cy", "width", "height")},
+        coefficients=coefficients,
+    )
+
+
+def decode_image(image: dict[str, Any], path: Path, frame_id: int) -> NDArray[np.uint8]:
+    """(height, width) grey values of an image of `frames`.
+
+    Raises:
+        UserError: not a grey PNG, or too small to hold a board; the message names the shard.
+    """
+    try:
+        pixels = decode_png(image["bytes"])
+        if min(pixels.shape) < LEAST_SIDE_PX:
+            raise ValueError(f"the image is {pixels.shape[1]} x {pixels.shape[0]} px")
+    except ValueError as error:
+        raise UserError(f"{path}, frame {frame_id}: {error}; delete it and run the generate stage again") from None
+    return pixels
+
+
+def of_detector(detections: pa.Table, detector: str) -> pa.Table:
+    """The rows of one detector."""
+    return detections.filter(pa.array(detections["detector"].to_numpy(zero_copy_only=False) == detector))
+
+
+def covariances_by_frame(rows: pa.Table, target: Target) -> dict[int, Array]:
+    """frame_id to (n, 2, 2) px^2 from rows of `detections`."""
+    count = len(target.points)
+    xx, xy, yy = (rows[name].to_numpy() for name in ("var_x_px2", "cov_xy_px2", "var_y_px2"))
+    found = np.stack((xx, xy, xy, yy), axis=1).reshape(-1, count, 2, 2)
+    frame = rows["frame_id"].to_numpy()
+    return {int(frame[i * count]): found[i] for i in range(len(found))}
+
+
+def points_by_frame(rows: pa.Table, target: Target) -> dict[int, Array]:
+    """frame_id to (n, 2) px from a long table of points."""
+    count = len(target.points)
+    frame = rows["frame_id"].to_numpy()
+    pixels = np.stack([rows["x_px"].to_numpy(), rows["y_px"].to_numpy()], axis=1).reshape(-1, count, 2)
+    return {int(frame[i * count]): pixels[i] for i in range(len(pixels))}

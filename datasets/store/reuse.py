@@ -1,0 +1,54 @@
+"""Linear light from another dataset of the same views: what was rendered once need not be rendered again."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+from pathlib import Path
+
+from datasets.errors import UserError
+from datasets.store.atomic import replace_atomically
+from datasets.store.dataset import Dataset, open_dataset, refused
+from datasets.store.linear_images import MasterError, masters, read_master
+
+
+def borrow_masters(dataset: Dataset, source: Path) -> tuple[int, int]:
+    """Link or copy into a dataset every master that it lacks and that `source` has, by the key of what it shows.
+
+    Returns:
+        How many masters were taken, and how many the dataset lacked.
+
+    Raises:
+        UserError: `source` holds no dataset, is this dataset itself, or the disk or its permissions refuse.
+    """
+    if source.resolve() == dataset.root.resolve():
+        raise UserError(f"--masters {source} is the dataset that is to be made; give the folder of another one")
+    offered = {key: path for path, key in masters(source, open_dataset(source).recipe)}
+    lacking = [(path, key) for path, key in masters(dataset.root, dataset.recipe) if not path.is_file()]
+    taken = [(path, offered[key]) for path, key in lacking if key in offered and _is_sound(offered[key], key)]
+    for path, other in taken:
+        try:
+            _link_or_copy(other, path)
+        except OSError as error:
+            raise refused(path, error) from error
+    return len(taken), len(lacking)
+
+
+def _is_sound(path: Path, key: str) -> bool:
+    try:
+        read_master(path, key)
+    except MasterError:
+        return False
+    return True
+
+
+def _link_or_copy(source: Path, path: Path) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        os.link(source, path)
+    except OSError as error:  # another disk, or a file system or a policy without links
+        if error.errno not in (errno.EXDEV, errno.EPERM, errno.EACCES, errno.EMLINK, errno.ENOTSUP, errno.ENOSYS):
+            raise
+        with replace_atomically(path) as temporary:
+            shutil.copyfile(source, temporary)

@@ -1,0 +1,67 @@
+"""Detection against OpenCV's finders on the same pictures."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterator
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from datasets.recipe.model import Recipe
+from pipelines.bench.cases import chosen_frames, image_of
+from pipelines.bench.table import Row, compared
+from pipelines.bench.timing import Times, in_turn, total
+from pipelines.detection import SUBPIX_STOP, SUBPIX_WINDOW, detect_points
+from pipelines.detection.finders import SECTOR_FLAGS
+from render.targets.chessboard import Target
+
+PART = "detection"
+Grey = NDArray[np.uint8]
+
+
+def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
+    """Rows for each camera against each finder, with how many pictures each finds."""
+    sums: list[list[Times]] = []
+    for camera, frames in chosen_frames(recipe, poses).items():
+        images = [image_of(recipe, frame) for frame in frames]
+        calls = [_ours, classic, sector_based]
+        times = [in_turn(*(functools.partial(call, image, recipe.target) for call in calls)) for image in images]
+        sums.append([total(list(column)) for column in zip(*times, strict=True)])
+        yield from _rows(camera, sums[-1], [_found(call, images, recipe.target) for call in calls], len(images))
+    every = [total(list(column)) for column in zip(*sums, strict=True)]
+    yield from _rows("one picture of each camera", every, None, poses)
+
+
+def classic(image: Grey, target: Target) -> bool:
+    """findChessboardCorners and cornerSubPix."""
+    found, corners = cv2.findChessboardCorners(image, target.inner)
+    if found:
+        cv2.cornerSubPix(image, corners, SUBPIX_WINDOW, (-1, -1), SUBPIX_STOP)
+    return found
+
+
+def sector_based(image: Grey, target: Target) -> bool:
+    """findChessboardCornersSB as exact as it gets."""
+    return cv2.findChessboardCornersSB(image, target.inner, flags=SECTOR_FLAGS)[0]
+
+
+def _ours(image: Grey, target: Target) -> bool:
+    return bool(np.mean(detect_points(image, target).status == "ok") > 0.9)
+
+
+def _found(call: Callable[[Grey, Target], bool], images: list[Grey], target: Target) -> int:
+    return sum(call(image, target) for image in images)
+
+
+def _rows(name: str, times: list[Times], found: list[int] | None, count: int) -> Iterator[Row]:
+    names = [
+        "corners and circle",
+        "findChessboardCorners, cornerSubPix",
+        "findChessboardCornersSB, exhaustive, accuracy",
+    ]
+    if found is not None:
+        names = [f"{text} (found {seen} of {count})" for text, seen in zip(names, found, strict=True)]
+    for other, that in zip(names[1:], times[1:], strict=True):
+        yield compared(PART, f"{name}: {names[0]}", times[0], other, that, count)

@@ -1,0 +1,74 @@
+"""End to end: every stage on a temporary dataset, against the 64 primary rays of the same frames."""
+
+from __future__ import annotations
+
+import functools
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from datasets.plan import plan, shard_count
+from datasets.recipe.model import Recipe
+from datasets.store.dataset import Dataset
+from pipelines.bench.cases import chosen_poses
+from pipelines.bench.primary_rays import NAME, primary_rays
+from pipelines.bench.table import Row, compared
+from pipelines.bench.timing import Times, in_turn
+from pipelines.detection import Detector
+from pipelines.stages import detect, estimate, generate, score
+from pipelines.stages.settings import Setting
+
+PART = "end to end"
+SETTING = Setting()
+
+
+def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
+    """One row for all stages together, and one for each."""
+    recipe = by_pose(recipe)
+    chosen = chosen_poses(recipe, poses)
+    frames = [frame for frame in plan(recipe) if frame.pose_id in chosen]
+    spent: dict[str, list[Times]] = {}
+    own, floor = in_turn(
+        functools.partial(run_stages, recipe, chosen, spent),
+        lambda: [primary_rays(recipe, frame) for frame in frames],
+    )
+    yield compared(PART, "all stages, a frame", own, NAME, floor, len(frames))
+    for name, times in spent.items():
+        wall, cpu = sorted(t.wall for t in times[1:]), min(t.cpu for t in times[1:])  # the first round warms up
+        yield compared(PART, f"of which {name}", Times(wall[len(wall) // 2], cpu), NAME, floor, len(frames))
+
+
+def by_pose(recipe: Recipe) -> Recipe:
+    """The recipe with one pose in a shard, so that a shard's number is the pose's."""
+    return recipe.model_copy(update={"shard_frames": len(recipe.cameras)})
+
+
+def run_stages(recipe: Recipe, poses: list[int], spent: dict[str, list[Times]] | None = None) -> None:
+    """Generate, detect, estimate with our solver, score, write: some poses of a recipe from `by_pose`.
+
+    spent: takes the times of each stage.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        dataset = Dataset(Path(folder), recipe)
+
+        def estimate_shard(pose: int) -> None:
+            estimate.run_shard(dataset, pose, SETTING)
+
+        def score_shard(pose: int) -> None:
+            score.run_shard(dataset, dataset.shard_path("estimates", pose, shard_count(recipe), SETTING.name))
+
+        steps: list[tuple[str, Callable[[int], None]]] = [
+            ("generate", lambda pose: generate.run_shard(dataset, pose)),
+            ("detect", lambda pose: detect.run_shard(dataset, pose, detector=Detector.EDGE_FIT)),
+            ("estimate", estimate_shard),
+            ("score", score_shard),
+        ]
+        for name, step in steps:
+            wall, cpu = time.perf_counter(), time.process_time()
+            for pose in poses:
+                step(pose)
+            dataset.write_manifest()
+            if spent is not None:
+                taken = Times(time.perf_counter() - wall, time.process_time() - cpu)
+                spent.setdefault(name, []).append(taken)

@@ -1,0 +1,79 @@
+"""How cost grows: the slope of log CPU time over log size, from three sizes measured in turn."""
+
+from __future__ import annotations
+
+import functools
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from datasets.plan import plan
+from datasets.recipe.model import Recipe
+from datasets.store.images import encode_png
+from datasets.store.linear_images import write_master
+from pipelines.bench.cases import chosen_poses, master_of, scaled
+from pipelines.bench.end_to_end import by_pose, run_stages
+from pipelines.bench.table import Row, noted
+from pipelines.bench.timing import in_turn
+from pipelines.detection import detect_points
+from render.sensor.develop import develop
+
+PART = "growth"
+POSES, SCALES, SAMPLES = (1, 2, 4), (0.5, 1.0, 2.0), (64, 256, 1024)  # poses, linear resolution, cells of a pixel
+
+
+def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
+    """Exponents of frames, pixels and samples."""
+    del poses  # three sizes are three sizes
+    staged = by_pose(recipe)
+    runs = [functools.partial(run_stages, staged, chosen_poses(recipe, count)) for count in POSES]
+    cameras = len(recipe.cameras)
+    yield _row("all stages, with frames", [cameras * count for count in POSES], runs)
+    for camera in (recipe.cameras[0].name, recipe.cameras[-1].name):
+        sizes = [scaled(recipe, factor) for factor in SCALES]
+        pixels = [size.cameras[0].width * size.cameras[0].height for size in sizes]
+        yield _row(
+            f"{camera}: frame without detection, with pixels",
+            pixels,
+            [functools.partial(_frame, size, camera) for size in sizes],
+        )
+        images = [_image(size, camera) for size in sizes]
+        yield _row(
+            f"{camera}: detection, with pixels",
+            pixels,
+            [functools.partial(detect_points, image, recipe.target) for image in images],
+        )
+        frame = next(frame for frame in plan(recipe) if frame.camera.name == camera)
+        yield _row(
+            f"{camera}: render, with samples",
+            SAMPLES,
+            [functools.partial(master_of, recipe, frame, samples) for samples in SAMPLES],
+        )
+
+
+def exponent(sizes: Sequence[float], seconds: Sequence[float]) -> float:
+    """Slope of log seconds over log size."""
+    return float(np.polyfit(np.log(sizes), np.log(seconds), 1)[0])
+
+
+def _row(what: str, sizes: Sequence[float], calls: Sequence[Callable[[], object]]) -> Row:
+    times = in_turn(*calls)
+    spent = " / ".join(f"{1e3 * time.wall:.3g}" for time in times)
+    slope = exponent(sizes, [time.cpu for time in times])
+    at = " / ".join(f"{size:g}" for size in sizes)
+    return noted(PART, what, spent, f"at {at}", f"exponent {slope:.2f}")
+
+
+def _frame(recipe: Recipe, camera: str) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        frame = next(frame for frame in plan(recipe) if frame.camera.name == camera)
+        master = master_of(recipe, frame)
+        write_master(master, frame.camera.true_camera(), Path(folder) / "master.exr")
+        encode_png(develop(master.full(frame.camera.true_camera()), frame.sensor))
+
+
+def _image(recipe: Recipe, camera: str) -> np.ndarray:
+    frame = next(frame for frame in plan(recipe) if frame.camera.name == camera)
+    return develop(master_of(recipe, frame).full(frame.camera.true_camera()), frame.sensor)

@@ -1,0 +1,102 @@
+"""Detection of one image: board, corners, circle. Nothing but the image and the target's dimensions goes in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from eposit.arrays import Array
+from pipelines.detection.board_map import BoardMap, grid
+from pipelines.detection.circle import find_circle
+from pipelines.detection.corners import BAD_SHARE, Corners, refine_corners, unrefined
+from pipelines.detection.finders import Grey, find_board, find_sector_based
+from render.targets.chessboard import Target
+
+CIRCLE_CLEARANCE = 1.3  # squares from the circle's foot within which the first, rough corners are not trusted
+SUBPIX_WINDOW = (5, 5)
+SUBPIX_STOP = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 40, 1e-3)
+
+
+class Detector(StrEnum):
+    """How corners are placed once OpenCV has found the board. The circle is fitted by us with each of them."""
+
+    EDGE_FIT = "edge-fit"  # ours: two blurred edges, least squares
+    OPENCV_SUBPIX = "opencv-subpix"  # cv2.findChessboardCorners, then cv2.cornerSubPix with half window 5
+    OPENCV_SB = "opencv-sb"  # cv2.findChessboardCornersSB, exhaustive and accurate
+
+
+class PointStatus(StrEnum):
+    """Outcome for one point."""
+
+    OK = "ok"
+    BOARD_NOT_FOUND = "board_not_found"  # no finder saw a complete board
+    CORNERS_INCONSISTENT = "corners_inconsistent"  # the corner, or too many of the board's, disagree with the others
+    CIRCLE_NOT_FOUND = "circle_not_found"  # no dark disc where the board puts the circle
+
+
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """Points of one image in the order of `Target.points`."""
+
+    points_px: Array  # (n, 2), NaN where the status is not ok
+    covariance_px2: Array  # (n, 2, 2) of each point, NaN likewise
+    status: NDArray[np.str_]  # (n,) PointStatus values
+    finder: str  # finder that saw the board, empty if none
+    blur_px: float  # median blur of the edges, NaN if none
+
+
+def detect_points(image: Grey, target: Target, detector: str = Detector.EDGE_FIT) -> Detection:
+    """Corners and circle of the target in an 8-bit image (height, width).
+
+    Raises:
+        ValueError: not a two-dimensional 8-bit image, or an unknown detector.
+    """
+    if image.ndim != 2 or image.dtype != np.uint8:
+        raise ValueError(f"image has shape {image.shape} and type {image.dtype}; give 8-bit grey, (height, width)")
+    if detector not in list(Detector):
+        raise ValueError(f"unknown detector {detector!r}; choose one of {', '.join(Detector)}")
+    count = len(target.points)
+    found = find_sector_based(image, target) if detector == Detector.OPENCV_SB else find_board(image, target)
+    if found is None:
+        return _nothing(count, PointStatus.BOARD_NOT_FOUND, "")
+    try:
+        corners = _corners(image, found.corners_px, target, detector)
+    except np.linalg.LinAlgError:  # corners that no camera could see
+        return _nothing(count, PointStatus.CORNERS_INCONSISTENT, found.finder)
+    if np.mean(~corners.consistent) > BAD_SHARE:
+        return _nothing(count, PointStatus.CORNERS_INCONSISTENT, found.finder)
+    circle = find_circle(image, corners.board, corners.blur_px, corners.contrast, target)
+    points, covariance = np.full((count, 2), np.nan), np.full((count, 2, 2), np.nan)
+    status = np.array([PointStatus.CORNERS_INCONSISTENT] * count, dtype="<U24")
+    good = np.append(corners.consistent, circle is not None)
+    points[:-1], covariance[:-1], status[-1] = corners.points_px, corners.covariance_px2, PointStatus.CIRCLE_NOT_FOUND
+    if circle is not None:
+        points[-1], covariance[-1] = circle.centre_px, circle.covariance_px2
+    status[good] = PointStatus.OK
+    points[~good], covariance[~good] = np.nan, np.nan
+    return Detection(points, covariance, status, found.finder, corners.blur_px)
+
+
+def _corners(image: Grey, found_px: Array, target: Target, detector: str) -> Corners:
+    at, size = grid(target.inner), (image.shape[1], image.shape[0])
+    foot = target.circle_centre[:2] / target.square_mm
+    clear = np.linalg.norm(at - foot, axis=1) > CIRCLE_CLEARANCE
+    fitted = refine_corners(image, BoardMap.fit_rough(at, found_px, size, clear), target)
+    if detector == Detector.EDGE_FIT or not np.any(fitted.consistent):
+        return fitted
+    placed = found_px
+    if detector == Detector.OPENCV_SUBPIX:
+        start = found_px.astype(np.float32).reshape(-1, 1, 2)
+        placed = cv2.cornerSubPix(image, start, SUBPIX_WINDOW, (-1, -1), SUBPIX_STOP).reshape(-1, 2).astype(np.float64)
+    return unrefined(placed, fitted, at, size)
+
+
+def _nothing(count: int, status: PointStatus, finder: str) -> Detection:
+    return Detection(
+        np.full((count, 2), np.nan), np.full((count, 2, 2), np.nan), np.array([status] * count, dtype="<U24"), finder,
+        float("nan"),
+    )  # fmt: skip

@@ -1,0 +1,135 @@
+"""The smooth map from board to image, fitted to the corners of one picture. It needs no camera and no lens."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from eposit.arrays import Array, Mask
+from eposit.starts.homography import homography_start
+from pipelines.detection import generic_lens
+
+FOCAL_SHARES = (0.2, 0.3, 0.45, 0.7, 1.1, 2.0)  # focal lengths to start from, as shares of the picture's width
+WIDEST_RAD = 2.2  # largest angle of a ray that a start may give a corner
+START_CORNERS = 16  # that a start is worked out from
+FIT_STEPS = 100
+FREE = np.array([0.0, 2e-2, 100.0, 100.0, 0.3, 0.3, 0.3])  # how far a lens may lie from the start: see `generic_lens`
+HOLD_SHARE = 1e-6  # weight of that against one pixel of one corner: it decides only what nothing else does
+FIRM_HOLD = 1.0
+BEND_STEP = 0.05  # squares; second differences at this step are good to 1e-5 px
+OUTLIER_PX = 1.5  # a worst corner farther off than this has all corners weighed by their distances
+GENTLE_PX = 0.5  # distance at which such a weight is one half
+
+
+@dataclass(frozen=True, slots=True)
+class BoardMap:
+    """Map from board coordinates (squares, first inner corner at the origin, z into the board) to px."""
+
+    R: Array  # (3, 3)
+    t: Array  # (3,) squares
+    lens: Array  # (7,) see `generic_lens`
+
+    @staticmethod
+    def fit(
+        at: Array,
+        corners_px: Array,
+        size: tuple[int, int],
+        weights: Array,
+        start: BoardMap | None = None,
+        hold: float = HOLD_SHARE,
+    ) -> BoardMap:
+        """Least squares over corners (n, 2) px of points (n, 2) in squares.
+
+        size: width and height of the picture, px. weights: (n,) inverse variances, 0 for a corner that takes no part.
+        start: a map near by; without it, focal lengths over the whole range are tried. hold: how firmly the lens stays
+        near the start's; corners that are only known to a pixel would bend it at will.
+        """
+        begin = _start(at, corners_px, size, weights > 0.0) if start is None else start
+        held = np.zeros(7)
+        held[1:] = hold * np.median(weights[weights > 0.0]) / FREE[1:] ** 2
+        x, y = (np.ascontiguousarray(column) for column in at.T)
+        pixels = np.where(weights[:, None] > 0.0, corners_px, 0.0)
+        return BoardMap(*generic_lens.fit(begin.R, begin.t, begin.lens, x, y, pixels, weights, held, FIT_STEPS))
+
+    @staticmethod
+    def fit_rough(at: Array, corners_px: Array, size: tuple[int, int], use: Mask) -> BoardMap:
+        """The map through corners of which some may be a few pixels off."""
+        board = BoardMap.fit(at, corners_px, size, use.astype(np.float64), hold=FIRM_HOLD)
+        distance = np.linalg.norm(board(at) - corners_px, axis=1)
+        if distance[use].max() <= OUTLIER_PX:
+            return board
+        return BoardMap.fit(at, corners_px, size, use / (1.0 + (distance / GENTLE_PX) ** 2), board, FIRM_HOLD)
+
+    def __call__(self, at: Array, height: float = 0.0) -> Array:
+        """(m, 2) or (2,) points in squares, `height` squares above the board, to (m, 2) or (2,) px."""
+        points = np.atleast_2d(np.asarray(at, np.float64))
+        pixels = np.empty(points.shape)
+        x, y = np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1])
+        generic_lens.project(self.R, self.t, self.lens, x, y, -height, pixels)
+        return pixels[0] if np.ndim(at) == 1 else pixels
+
+    def jacobian(self, at: Array, height: float = 0.0, step: float = 1e-3) -> Array:
+        """(m, 2, 2) or (2, 2) px per square; columns are along x and along y."""
+        around = np.concatenate([np.atleast_2d(at) + sign * d for d in np.eye(2) * step for sign in (1.0, -1.0)])
+        xp, xm, yp, ym = self(around, height).reshape(4, -1, 2)
+        slope = np.stack((xp - xm, yp - ym), axis=-1) / (2.0 * step)
+        return slope[0] if np.ndim(at) == 1 else slope
+
+    def curvatures(self, at: Array, jacobian: Array) -> Array:
+        """(m, 2) curvatures, 1/px, of the images of the lines through (m, 2) points along y and along x.
+
+        Each is towards the normal (cos, sin) at the angle that `normal_angles` gives for the line.
+        """
+        around = np.concatenate([at + d for d in (*(np.eye(2) * BEND_STEP), *(-np.eye(2) * BEND_STEP), np.zeros(2))])
+        xp, yp, xm, ym, middle = self(around).reshape(5, -1, 2)
+        angles = normal_angles(jacobian)
+        bends = np.stack((yp + ym - 2.0 * middle, xp + xm - 2.0 * middle), axis=1) / BEND_STEP**2
+        normals = np.stack((np.cos(angles), np.sin(angles)), axis=-1)
+        lengths = np.sum(jacobian[:, :, ::-1] ** 2, axis=1)  # squared length of the image of a square along y, along x
+        return np.sum(bends * normals, axis=-1) / lengths
+
+    def slopes(self, at: Array) -> Array:
+        """(m, 2, 13) change of the pixels for a change of each of the map's parameters."""
+        out = np.empty((2 * len(at), generic_lens.PARAMETERS))
+        x, y = (np.ascontiguousarray(column) for column in at.T)
+        generic_lens.slopes(self.R, self.t, self.lens, x, y, out)
+        return out.reshape(-1, 2, generic_lens.PARAMETERS)
+
+    def meet_planes(self, x_px: Array, y_px: Array, heights: Array) -> Array:
+        """(k, 2, h, w) points, in squares, where the rays of a grid of pixels meet planes above the board.
+
+        x_px: (w,) columns. y_px: (h,) rows. heights: (k,) squares above the board.
+        """
+        out = np.empty((len(heights), 2, len(y_px), len(x_px)))
+        generic_lens.meet_planes(self.R, self.t, self.lens, x_px, y_px, -np.asarray(heights, np.float64), out)
+        return out
+
+
+def grid(inner: tuple[int, int]) -> Array:
+    """(n, 2) column and row of the inner corners, in squares."""
+    y, x = np.mgrid[0 : inner[1], 0 : inner[0]]
+    return np.stack((x.ravel(), y.ravel()), axis=1).astype(np.float64)
+
+
+def normal_angles(jacobian: Array) -> Array:
+    """(m, 2) directions, rad, of the normals of the images of lines along y and along x."""
+    along_x, along_y = jacobian[:, :, 0], jacobian[:, :, 1]
+    return np.stack((np.arctan2(-along_y[:, 0], along_y[:, 1]), np.arctan2(-along_x[:, 0], along_x[:, 1])), axis=1)
+
+
+def _start(at: Array, corners_px: Array, size: tuple[int, int], use: Mask) -> BoardMap:
+    """The best of the equidistance lenses at the picture's centre, each with the pose that its homography gives."""
+    centre = (np.array(size) - 1.0) / 2.0
+    some = np.flatnonzero(use)[:: max(1, int(np.sum(use)) // START_CORNERS)]
+    points, offset = np.column_stack((at[some], np.zeros(len(some)))), corners_px[some] - centre
+    radius = np.linalg.norm(offset, axis=1)
+    shares = [share for share in FOCAL_SHARES if radius.max() / (share * size[0]) < WIDEST_RAD]
+    focal = np.array(shares or [radius.max() / WIDEST_RAD / size[0]]) * size[0]
+    theta = radius / focal[:, None]
+    side = np.sin(theta) / np.maximum(radius, 1e-9)
+    bearings = np.concatenate((offset * side[..., None], np.cos(theta)[..., None]), axis=-1)
+    R, t = homography_start(points, bearings)
+    maps = [BoardMap(R[i], t[i], np.array([focal[i], 0.0, *centre, 0.0, 0.0, 0.0])) for i in range(len(focal))]
+    misses = [np.sum((board(at[some]) - corners_px[some]) ** 2) for board in maps]
+    return maps[int(np.argmin(misses))]

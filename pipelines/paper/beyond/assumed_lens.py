@@ -1,0 +1,142 @@
+"""What a wrong lens law costs: poses through one lens, solved as if through another."""
+
+from __future__ import annotations
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.colors import LogNorm
+
+from eposit import LENS_NAMES, Pose, Solution
+from eposit.arrays import Array
+from pipelines.paper.beyond.field import solve_by
+from pipelines.paper.claims import Claim, Drawing, Section, Table, Verdict
+from pipelines.paper.problems import OBJECT, bounds, camera_with, errors_of, fisheye_with, helix, information, turned
+from pipelines.report.svg import STYLE, svg
+
+LENSES = tuple(name for name in LENS_NAMES if name != "kannala_brandt")
+SOLVERS = {"best": "Default solver", "eposit": "EPOSIT"}
+FAR_DEG = 40.0
+HEAT_RANGE = (0.01, 1000.0)  # degrees and mm alike, logarithmic
+
+
+def assumed_lens(step: float = 2.0, seed: int = 5) -> Section:
+    """Median errors for all 25 pairs of lenses on the paper's helix and with the camera turned by 40 degrees."""
+    scenes = {"on the helix": helix(step), f"turned by {FAR_DEG:g} degrees": turned(helix(step), FAR_DEG, seed)}
+    found = {(method, scene): _all_pairs(pose, method) for method in SOLVERS for scene, pose in scenes.items()}
+    tables = tuple(
+        _table(f"{SOLVERS[method]}: median {what} {scene} ({_angle_text(scenes[scene])})", values[i])
+        for (method, scene), values in found.items()
+        for i, what in enumerate(("rotation error, deg,", "position error, mm,"))
+    )
+    intro = (
+        "All five lenses with the paper's fish-eye focal length and principal point, exact image points of the paper's "
+        "four. Off the diagonal the solver assumes a wrong law: what is left is the error of the law alone. EPOSIT "
+        "gives no pose where its iteration diverges or its result does not reproduce the points; that counts as "
+        "infinitely wrong."
+    )
+    drawn = {scene: found["best", scene] for scene in scenes}
+    note = "The default solver. Logarithmic colours; rows are the true lens."
+    drawing = Drawing("Error of a wrong lens law", _heat_maps(drawn), note)
+    return Section("An assumed lens", intro, (drawing, *tables), (_claim(list(scenes.values()), found),))
+
+
+def _all_pairs(pose: Pose, method: str) -> tuple[Array, Array]:
+    """(5, 5) median rotation error, deg, and position error, mm: true lens by assumed lens."""
+    rotation, position = np.empty((5, 5)), np.empty((5, 5))
+    for i, true in enumerate(LENSES):
+        pixels = fisheye_with(true).project(pose.apply(OBJECT))
+        for j, assumed in enumerate(LENSES):
+            rotation[i, j], position[i, j] = _medians(solve_by(method, OBJECT, pixels, fisheye_with(assumed)), pose)
+    return rotation, position
+
+
+def _medians(solution: Solution, pose: Pose) -> tuple[float, float]:
+    error = np.where(np.isfinite(error := errors_of(solution, pose)), error, np.inf)
+    lengths = (np.sqrt(np.sum(part**2, axis=1)) for part in (np.degrees(error[:, :3]), error[:, 3:]))
+    rotation, position = (float(np.median(length)) for length in lengths)
+    return rotation, position
+
+
+def _angle_text(pose: Pose) -> str:
+    x, y, z = np.moveaxis(pose.apply(OBJECT), -1, 0)
+    angle = np.degrees(np.arctan2(np.hypot(x, y), z))
+    return f"points {angle.min():.0f} to {angle.max():.0f} degrees off the axis"
+
+
+def _shown(value: float) -> str:
+    return (
+        "no pose"
+        if not np.isfinite(value)
+        else "0"
+        if value < 1e-6
+        else f"{value:.2g}"
+        if value < 100
+        else f"{value:.0f}"
+    )
+
+
+def _table(title: str, values: Array) -> Table:
+    rows = tuple((f"true {name}", *map(_shown, row.tolist())) for name, row in zip(LENSES, values, strict=True))
+    return Table(title, ("", *(f"assumed {name}" for name in LENSES)), rows)
+
+
+def _heat_maps(found: dict[str, tuple[Array, Array]]) -> str:
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(1, 4, figsize=(12, 3.3), layout="constrained", sharey=True)
+        panels = [(scene, i) for scene in found for i in (0, 1)]
+        for axis, (scene, i) in zip(axes, panels, strict=True):
+            values = found[scene][i]
+            drawn = np.clip(np.nan_to_num(values, posinf=HEAT_RANGE[1]), *HEAT_RANGE)
+            axis.imshow(drawn, norm=LogNorm(*HEAT_RANGE), cmap="YlOrRd")
+            for row, column in np.ndindex(values.shape):
+                colour = "white" if drawn[row, column] > 50.0 else "black"
+                text = _shown(float(values[row, column])).replace("no pose", "none")
+                axis.text(column, row, text, ha="center", va="center", fontsize=7, color=colour)
+            axis.set_title(f"{('rotation, deg', 'position, mm')[i]}, {scene}", fontsize=9)
+            axis.set_xticks(range(5), LENSES, rotation=60)
+            axis.set_yticks(range(5), LENSES)
+            axis.set_xlabel("assumed")
+        axes[0].set_ylabel("true")
+        return svg(figure)
+
+
+def _claim(poses: list[Pose], found: dict[tuple[str, str], tuple[Array, Array]]) -> Claim:
+    """Judged on the four fish-eyes: the error of the worst wrong law beside what noise of 0.4 px does anyway."""
+    (near, far), values = poses, list(found.values())
+    (near_rotation, _), (far_rotation, far_position) = (_worst_fisheye(pair) for pair in values[:2])
+    noise_near, noise_far = _noise_rotation(near), _noise_rotation(far)
+    holds_near, holds_far = near_rotation < noise_near, far_rotation < noise_far
+    verdict = Verdict.HOLDS if holds_near and holds_far else Verdict.PARTLY if holds_near else Verdict.FAILS
+    linear_rotation, linear_position = _worst_fisheye(values[2])
+    lost = int(np.sum(np.isinf(values[3][0][1:, 1:])))
+    why = (
+        f"The laws differ by theta cubed. On the paper's helix, {_angle_text(near)}, the worst wrong fish-eye law "
+        f"turns the default solver's pose by {near_rotation:.2g} degrees, and noise of 0.4 px by {noise_near:.2g}. "
+        f"{FAR_DEG:g} degrees off the axis it turns it by {far_rotation:.2g} degrees and moves it by "
+        f"{far_position:.0f} mm, where noise turns it by {noise_far:.2g}. The law matters where a fish-eye is needed; "
+        "the simulation stays where it does not."
+    )
+    return Claim(
+        section="III-A",
+        text="The projection model of a fish-eye need not be determined beforehand",
+        paper="four fish-eyes agree within 0.01 deg",
+        equations=(
+            f"worst wrong fish-eye law on the helix: {linear_rotation:.2g} deg, {linear_position:.2g} mm; at "
+            f"{FAR_DEG:g} degrees most poses are lost for {lost} of 12 wrong pairs"
+        ),
+        released="theta = asin(r / f) for every lens: the column of the assumed orthogonal lens",
+        verdict=verdict,
+        why=why,
+        part="beyond",
+    )
+
+
+def _worst_fisheye(values: tuple[Array, Array]) -> tuple[float, float]:
+    rotation, position = (float(np.max(part[1:, 1:])) for part in values)
+    return rotation, position
+
+
+def _noise_rotation(pose: Pose) -> float:
+    """Median over the poses of the Cramer-Rao bound of the whole rotation at 0.4 px, orthogonal lens, deg."""
+    spread = bounds(information(camera_with("orthogonal"), OBJECT, pose))[:, :3]
+    return float(np.degrees(np.median(np.sqrt(np.sum(spread**2, axis=1)))))

@@ -1,0 +1,58 @@
+"""Stage 2: find the target's points in the images, from the PNG's bytes and the target's dimensions alone.
+
+Each detector has its own shards beside the others'; those of our own have no name in theirs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+
+from datasets.plan import shard_count
+from datasets.rows import decode_image, table
+from datasets.schema import DETECTIONS
+from datasets.store.dataset import Dataset
+from pipelines.detection import Detector, detect_points
+
+
+def path_of(dataset: Dataset, index: int, detector: str) -> Path:
+    """Place of one shard."""
+    variant = "" if detector == Detector.EDGE_FIT else detector
+    return dataset.shard_path("detections", index, shard_count(dataset.recipe), variant)
+
+
+def is_done(dataset: Dataset, index: int, detector: str) -> bool:
+    """Whether a shard is there."""
+    return dataset.is_done(path_of(dataset, index, detector))
+
+
+def run_shard(dataset: Dataset, index: int, advance: Callable[[], None] = lambda: None, *, detector: str) -> None:
+    """Make one shard of `detections` from the same shard of `frames`.
+
+    advance: called after each frame.
+    """
+    path = dataset.shard_path("frames", index, shard_count(dataset.recipe))
+    frames = dataset.read_shard(path, ["frame_id", "image"])
+    parts: list[pa.Table] = []
+    for frame_id, image in zip(frames["frame_id"].to_pylist(), frames["image"].to_pylist(), strict=True):
+        found = detect_points(decode_image(image, path, frame_id), dataset.recipe.target, detector)
+        n = len(found.status)
+        columns = {
+            "frame_id": np.full(n, frame_id),
+            "detector": np.full(n, detector),
+            "point_id": np.arange(n),
+            "x_px": found.points_px[:, 0],
+            "y_px": found.points_px[:, 1],
+            "var_x_px2": found.covariance_px2[:, 0, 0],
+            "cov_xy_px2": found.covariance_px2[:, 0, 1],
+            "var_y_px2": found.covariance_px2[:, 1, 1],
+            "status": found.status,
+            "finder": np.full(n, found.finder),
+            "blur_px": np.full(n, found.blur_px),
+        }
+        parts.append(table(DETECTIONS, columns))
+        advance()
+    dataset.write_shard(path_of(dataset, index, detector), pa.concat_tables(parts))

@@ -1,0 +1,121 @@
+"""Stage 3: poses from points. A new solver, camera or choice of points adds shards; nothing is rendered again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from datasets.errors import UserError
+from datasets.plan import Stream, rng_for, shard_count
+from datasets.rows import camera_of, covariances_by_frame, estimate_rows, points_by_frame
+from datasets.schema import FRAMES
+from datasets.store.dataset import Dataset
+from eposit import Solution
+from eposit.arrays import Array
+from pipelines.adapters.registry import find_solver, takes_theta_centre
+from pipelines.adapters.results import Answer, Solver, gather
+from pipelines.adapters.user import is_given
+from pipelines.stages.detect import path_of
+from pipelines.stages.settings import Setting, assumed
+
+REACHES_BOUND = "best"  # the solver that weighs its points, so that their covariances tell the pose's
+
+
+def is_done(dataset: Dataset, index: int, setting: Setting) -> bool:
+    """Whether a shard is there."""
+    return dataset.is_done(path_of_shard(dataset, index, setting.name))
+
+
+def run_shard(dataset: Dataset, index: int, setting: Setting) -> str | None:
+    """Make one shard of `estimates`; what a user's function first failed with, if it did."""
+    count = shard_count(dataset.recipe)
+    columns = [name for name in FRAMES.names if name != "image"]
+    frames = dataset.read_shard(dataset.shard_path("frames", index, count), columns).to_pylist()
+    target, detected = dataset.recipe.target, setting.points == "detected"
+    notes: list[str] = []
+    solver = find_solver(setting.solver, notes.append)
+    path = path_of(dataset, index, setting.detector) if detected else dataset.shard_path("keypoints", index, count)
+    rows = dataset.read_shard(path)
+    points = points_by_frame(rows, target)
+    sigmas = covariances_by_frame(rows, target) if detected else {}
+    parts: list[pa.Table] = []
+    for frame in frames:
+        frame_id, before = frame["frame_id"], len(notes)
+        parts.append(_estimate(dataset, frame, points[frame_id], sigmas.get(frame_id), setting, solver))
+        notes[before:] = [f"frame {frame_id}: {note}" for note in notes[before:]]
+    dataset.write_shard(path_of_shard(dataset, index, setting.name), pa.concat_tables(parts))
+    return notes[0] if notes else None
+
+
+def path_of_shard(dataset: Dataset, index: int, name: str) -> Path:
+    """Place of one shard of the estimates that have a name."""
+    return dataset.shard_path("estimates", index, shard_count(dataset.recipe), name)
+
+
+def _estimate(
+    dataset: Dataset,
+    frame: dict[str, Any],
+    points_px: Array,
+    sigma: Array | None,
+    setting: Setting,
+    solver: Solver,
+) -> pa.Table:
+    """Rows of one frame, one for each draw. sigma: (n, 2, 2) covariances of detected points, px^2."""
+    target = dataset.recipe.target
+    chosen = np.array(dataset.recipe.four_indices()) if setting.use == "four" else np.arange(len(target.points))
+    noisy = setting.points == "truth+noise"
+    draws = range(setting.draws if noisy else 1)
+    batch = np.stack([points_px + _noise(dataset, frame, draw, setting) if noisy else points_px for draw in draws])[
+        :, chosen
+    ]
+    found = np.all(np.isfinite(batch[0]), axis=1)
+    if setting.use == "all":  # a point that was not found takes no part; of four, none may be missing
+        chosen, batch = chosen[found], batch[:, found]
+    if np.sum(found) < 4:
+        answers = [Answer("points_missing")] * len(batch)
+        solution = gather(target.points[chosen], batch, camera_of(frame), answers, single=False)
+    else:
+        known = setting.noise_px if noisy else None if sigma is None else sigma[chosen]
+        solution = solve_with(setting, target.points[chosen], batch, frame, known, solver)
+        if known is None or not (setting.solver == REACHES_BOUND or is_given(setting.solver)):
+            solution = replace(solution, covariance=np.full((len(batch), 6, 6), np.nan))
+    key = (setting.solver, setting.points_name, setting.camera, setting.use)
+    return estimate_rows([frame["frame_id"]] * len(batch), draws, key, solution, len(chosen))
+
+
+def _noise(dataset: Dataset, frame: dict[str, Any], draw: int, setting: Setting) -> Array:
+    """Noise of one draw, keyed by the pose, so that the lenses of one pose share it as in the paper."""
+    rng = rng_for(dataset.recipe.seed, Stream.POINT_NOISE, frame["pose_id"], draw)
+    return setting.noise_px * rng.standard_normal((len(dataset.recipe.target.points), 2))
+
+
+def solve_with(
+    setting: Setting,
+    points_in_obj: Array,
+    batch: Array,
+    frame: dict[str, Any],
+    sigma_px: Array | float | None = None,
+    solver: Solver | None = None,
+) -> Solution:
+    """Solve a batch with the camera that the setting assumes; `sigma_px` as for `eposit.solve`.
+
+    solver: the setting's, if it is at hand already.
+
+    Raises:
+        UserError: the solver does not take these points.
+    """
+    camera = assumed(frame, setting.camera)
+    centre: dict[str, Any] = {}
+    if setting.camera == "paper" and takes_theta_centre(setting.solver):
+        centre = {"theta_centre": (camera.width / 2.0, camera.height / 2.0)}
+    solver = solver or find_solver(setting.solver)
+    try:
+        return solver(points_in_obj, batch, camera, sigma_px=sigma_px, **centre)
+    except UserError:
+        raise
+    except ValueError as error:
+        raise UserError(f"solver {setting.solver} does not take these points: {error}") from error

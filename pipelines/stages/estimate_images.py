@@ -1,0 +1,76 @@
+"""Whole systems of others, from an image to a pose: a user's function, or a file of poses.
+
+Their rows stand in `estimates` beside the solvers': points "image", use "all", draw 0.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from datasets.plan import shard_count
+from datasets.rows import decode_image, estimate_rows
+from datasets.schema import FRAMES
+from datasets.store.dataset import Dataset
+from eposit import Camera
+from pipelines.adapters.results import Answer, stack
+from pipelines.adapters.user import attempt, check_call, load_function
+from pipelines.stages.estimate import path_of_shard
+from pipelines.stages.settings import ALL, IMAGE, System, assumed
+from render.targets.chessboard import Target
+
+Estimator = Callable[[NDArray[np.uint8], Camera, Target], Any]
+
+
+def find_estimator(name: str) -> Estimator:
+    """The user's function package.module:function, which takes image, camera and target.
+
+    Raises:
+        UserError: it cannot be imported, or does not take three arguments.
+    """
+    function = load_function(name, "--estimator")
+    check_call(function, f"--estimator {name}", "(image, camera, target)", 3)
+    return function
+
+
+def is_done(dataset: Dataset, index: int, system: System) -> bool:
+    """Whether a shard is there."""
+    return dataset.is_done(path_of_shard(dataset, index, system.shard_name))
+
+
+def run_shard(
+    dataset: Dataset, index: int, advance: Callable[[], None] = lambda: None, *, system: System
+) -> str | None:
+    """Make one shard of `estimates` from the same shard of `frames`; what the function first failed with, if it did.
+
+    The function is called once for each image, (h, w) grey values. advance: called after each frame.
+    """
+    function, target = find_estimator(system.name), dataset.recipe.target
+    path = dataset.shard_path("frames", index, shard_count(dataset.recipe))
+    answers: list[Answer] = []
+    notes: list[str] = []
+    frames = dataset.read_shard(path, list(FRAMES.names)).to_pylist()
+    for frame in frames:
+        frame_id = frame["frame_id"]
+        image, camera = np.array(decode_image(frame["image"], path, frame_id)), assumed(frame, system.camera)
+        call = functools.partial(function, image, camera, target)
+        answers.append(attempt(call, f"--estimator {system.name}", _named(frame_id, notes)))
+        advance()
+    rows = system_rows([frame["frame_id"] for frame in frames], system, answers)
+    dataset.write_shard(path_of_shard(dataset, index, system.shard_name), rows)
+    return notes[0] if notes else None
+
+
+def system_rows(frame_ids: Sequence[int], system: System, answers: Sequence[Answer]) -> pa.Table:
+    """Rows of `estimates`; no points were given, so there is no reprojection error."""
+    key = (system.name, IMAGE, system.camera, ALL)
+    return estimate_rows(frame_ids, [0] * len(frame_ids), key, stack(answers), 0)
+
+
+def _named(frame_id: int, notes: list[str]) -> Callable[[str], None]:
+    return lambda note: notes.append(f"frame {frame_id}: {note}")

@@ -1,0 +1,139 @@
+"""Stage 1: render, develop and store images with their truth."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+
+import numpy as np
+import pyarrow as pa
+
+from datasets.errors import UserError
+from datasets.plan import Frame, plan, shard_count
+from datasets.recipe.model import Recipe
+from datasets.rows import pose_columns, table
+from datasets.schema import FRAMES, KEYPOINTS
+from datasets.store.dataset import Dataset, refused
+from datasets.store.images import encode_png
+from datasets.store.linear_images import MasterError, master_key, master_path, read_master, write_master
+from eposit.pose import tilt_rad
+from pipelines.engines.background import overlapped
+from render.frame import Master, render_master
+from render.sensor.develop import Shot, develop
+
+
+def is_done(dataset: Dataset, index: int) -> bool:
+    """Whether both tables of a shard and its masters are there."""
+    count = shard_count(dataset.recipe)
+    if not all(dataset.is_done(dataset.shard_path(name, index, count)) for name in ("frames", "keypoints")):
+        return False
+    return all((dataset.root / master_path(frame)).is_file() for frame in _frames(dataset.recipe, index))
+
+
+def run_shard(dataset: Dataset, index: int, advance: Callable[[], None] = lambda: None) -> None:
+    """Make one shard of `frames` and `keypoints` and its masters.
+
+    advance: called after each frame.
+    """
+    recipe = dataset.recipe
+    count, chosen = shard_count(recipe), _frames(recipe, index)
+    makers = (functools.partial(_finish, dataset, frame, *_light(dataset, frame)) for frame in chosen)
+    rows = list(overlapped(makers, advance))
+    truth = pa.concat_tables(_keypoints(recipe, frame) for frame in chosen)
+    dataset.write_shard(dataset.shard_path("keypoints", index, count), truth)
+    dataset.write_shard(dataset.shard_path("frames", index, count), pa.Table.from_pylist(rows, schema=FRAMES))
+
+
+def _frames(recipe: Recipe, index: int) -> tuple[Frame, ...]:
+    return plan(recipe)[index * recipe.shard_frames : (index + 1) * recipe.shard_frames]
+
+
+def _light(dataset: Dataset, frame: Frame) -> tuple[Master, bool]:
+    """The frame's linear light, and whether it is new: read if it is there and made from the same things."""
+    recipe = dataset.recipe
+    try:
+        return read_master(dataset.root / master_path(frame), master_key(recipe, frame)), False
+    except MasterError:
+        pass
+    try:
+        return render_master(
+            recipe.target,
+            recipe.light,
+            frame.camera.true_camera(),
+            frame.cam_from_obj,
+            samples=recipe.sample_count(),
+        ), True
+    except ValueError as error:
+        raise UserError(f"frame {frame.frame_id}: {error}") from error
+
+
+def _finish(dataset: Dataset, frame: Frame, master: Master, is_new: bool) -> dict[str, object]:
+    """Write the master if it is new, develop it, and make the frame's row."""
+    recipe, spec = dataset.recipe, frame.camera
+    camera, relative = spec.true_camera(), master_path(frame)
+    if is_new:
+        try:
+            write_master(master, camera, dataset.root / relative, master_key(recipe, frame))
+        except OSError as error:
+            raise refused(dataset.root / relative, error) from error
+    shot = Shot(recipe.target, camera, frame.cam_from_obj, frame.rate, master.region, frame.sensor_seed)
+    image = develop(master.full(camera), frame.sensor, shot)
+    coefficients = np.zeros(4)
+    coefficients[: len(spec.coefficients)] = spec.coefficients
+    region = dict(
+        zip(("region_x_px", "region_y_px", "region_width_px", "region_height_px"), master.region, strict=True)
+    )
+    pose = {
+        name: values[0] for name, values in pose_columns(frame.cam_from_obj.R[None], frame.cam_from_obj.t[None]).items()
+    }
+    return {
+        "frame_id": frame.frame_id,
+        "pose_id": frame.pose_id,
+        "time_s": frame.time_s,
+        "camera_name": spec.name,
+        "lens": spec.lens,
+        "image": {"bytes": encode_png(image), "path": f"{frame.frame_id:06d}.png"},
+        **pose,
+        **{f"{name}_px": getattr(spec, name) for name in ("fx", "fy", "cx", "cy")},
+        **{f"k{i}": float(k) for i, k in enumerate(coefficients, 1)},
+        "nominal_f_px": spec.nominal_camera().fx,
+        "tilt_deg": float(np.degrees(tilt_rad(frame.cam_from_obj.R))),
+        "width_px": spec.width,
+        "height_px": spec.height,
+        **region,
+        "render_seed": frame.render_seed,
+        "sensor_seed": frame.sensor_seed,
+        "master": relative,
+    }
+
+
+def _keypoints(recipe: Recipe, frame: Frame) -> pa.Table:
+    target, camera = recipe.target, frame.camera.true_camera()
+    points = target.points
+    in_cam = frame.cam_from_obj.apply(points)
+    pixels = camera.project(in_cam)
+    outline = pixels.copy()
+    outline[target.circle_index] = outline_centroid(camera.project(frame.cam_from_obj.apply(target.circle_rim())))
+    return table(
+        KEYPOINTS,
+        {
+            "frame_id": np.full(len(points), frame.frame_id),
+            "point_id": np.arange(len(points)),
+            **{f"{axis}_obj_mm": points[:, i] for i, axis in enumerate("xyz")},
+            "x_px": pixels[:, 0],
+            "y_px": pixels[:, 1],
+            "x_outline_px": outline[:, 0],
+            "y_outline_px": outline[:, 1],
+            "theta_deg": np.degrees(np.arctan2(np.hypot(in_cam[:, 0], in_cam[:, 1]), in_cam[:, 2])),
+            "in_image": camera.contains(pixels),
+        },
+    )
+
+
+def outline_centroid(polygon: np.ndarray) -> np.ndarray:
+    """(2,) area centroid of a closed polygon (n, 2)."""
+    origin = polygon[0]  # near the polygon, so that differences of large products do not cost digits
+    p = polygon - origin
+    following = np.roll(p, -1, axis=0)
+    cross = p[:, 0] * following[:, 1] - p[:, 1] * following[:, 0]
+    return origin + cross @ (p + following) / (3.0 * cross.sum())

@@ -1,0 +1,190 @@
+"""A file of poses that another system made, CSV or Parquet, as rows of `estimates`."""
+
+from __future__ import annotations
+
+import csv
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from datasets.errors import UserError
+from datasets.plan import shard_count
+from datasets.store.dataset import Dataset
+from datasets.store.digest import table_digest
+from eposit import Pose, Status
+from eposit.arrays import Array
+from pipelines.adapters.registry import solver_names
+from pipelines.adapters.results import Answer, Failure, found
+from pipelines.stages import score
+from pipelines.stages.estimate import path_of_shard
+from pipelines.stages.estimate_images import system_rows
+from pipelines.stages.settings import System
+
+FRAME = "frame_id"
+QUATERNION = tuple(f"q_{axis}" for axis in "wxyz")
+MATRIX = tuple(f"r{row}{column}" for row in "123" for column in "123")
+POSITIONS = (tuple(f"t_{axis}_mm" for axis in "xyz"), tuple(f"t{axis}" for axis in "xyz"))
+FORM = "frame_id, q_w q_x q_y q_z or r11 to r33, and t_x_mm t_y_mm t_z_mm or tx ty tz in mm"
+NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,63}")
+TOLERANCE = 1e-3  # of a quaternion's length and of R^T R - 1: three decimals
+
+
+def import_poses(dataset: Dataset, path: Path, system: System) -> int:
+    """Write a file's poses as the estimates of a system, and forget its old scores where they differ.
+
+    Returns:
+        How many frames the file has no pose for: their status is missing.
+
+    Raises:
+        UserError: a name that is not usable, a file that cannot be read, or poses that are wrong.
+    """
+    _check_name(system.name)
+    answers = read_poses(path)
+    known = set(dataset.read("frames", [FRAME])[FRAME].to_pylist())
+    unknown = sorted(set(answers) - known)
+    if unknown:
+        more = f" and {len(unknown) - 1} more" if len(unknown) > 1 else ""
+        raise UserError(
+            f"{path} has frame_id {unknown[0]}{more}, which {dataset.root} has not; its frames are {min(known)} to "
+            f"{max(known)}"
+        )
+    count = shard_count(dataset.recipe)
+    for index in range(count):
+        ids = dataset.read_shard(dataset.shard_path("frames", index, count), [FRAME])[FRAME].to_pylist()
+        rows = system_rows(ids, system, [answers.get(frame, Answer(Failure.MISSING)) for frame in ids])
+        shard = path_of_shard(dataset, index, system.shard_name)
+        if not (dataset.is_done(shard) and table_digest(dataset.read_shard(shard)) == table_digest(rows)):
+            score.forget(dataset, shard)
+            dataset.write_shard(shard, rows)
+    dataset.write_manifest()
+    return len(known - set(answers))
+
+
+def _check_name(name: str) -> None:
+    if not NAME.fullmatch(name):
+        raise UserError(f"name {name!r} is not usable; give --name of letters, digits, '.', '_' and '-', at most 64")
+    if name in solver_names():
+        raise UserError(f"name {name!r} is a solver's; give --name another one")
+
+
+def read_poses(path: Path) -> dict[int, Answer]:
+    """frame_id to pose. A row is a failure if its `status` says another thing than ok, or its whole pose is empty.
+
+    Raises:
+        UserError: what is wrong with the file, its columns or its first wrong row.
+    """
+    columns = _columns(path)
+    rotation = _chosen(path, columns, (QUATERNION, MATRIX))
+    position = _chosen(path, columns, POSITIONS)
+    numbers = {name: _numbers(path, name, columns[name]) for name in (FRAME, *rotation, *position)}
+    frames = _frames(path, numbers[FRAME])
+    R = np.stack([numbers[name] for name in rotation], axis=1)
+    t = np.stack([numbers[name] for name in position], axis=1)
+    told = [str(status or "").strip() or Status.OK for status in columns.get("status", [None] * len(frames))]
+    return {
+        frame: _pose(path, frame, R[i], t[i]) if status.lower() == Status.OK else Answer(status)
+        for i, (frame, status) in enumerate(zip(frames, told, strict=True))
+    }
+
+
+def _columns(path: Path) -> dict[str, list[Any]]:
+    """Name to values; of CSV they are text.
+
+    Raises:
+        UserError: a file that cannot be read.
+    """
+    try:
+        if path.suffix.lower() == ".parquet":
+            table = pq.read_table(path)
+            header, values = table.column_names, [column.to_pylist() for column in table.columns]
+        elif path.suffix.lower() == ".csv":
+            with open(path, encoding="utf-8-sig", newline="") as file:
+                first, *rows = list(csv.reader(file, skipinitialspace=True)) or [[]]
+            header = [name.strip() for name in first]
+            values = _transposed(path, header, rows)
+        else:
+            raise UserError(f"{path} is neither .csv nor .parquet; give --poses one of them")
+    except UnicodeDecodeError:
+        raise UserError(f"cannot read {path}: it is not UTF-8 text; give --poses a .csv or .parquet file") from None
+    except OSError as error:
+        raise UserError(f"cannot read {path}: {error.strerror or 'it is damaged'}; give --poses another file") from None
+    except (pa.ArrowException, csv.Error) as error:
+        raise UserError(f"cannot read {path}: {_first_line(error)}; give --poses another file") from None
+    twice = next((name for i, name in enumerate(header) if name in header[:i]), None)
+    if twice is not None:
+        raise UserError(f"{path} has the column {twice!r} twice; leave one out")
+    return dict(zip(header, values, strict=True))
+
+
+def _transposed(path: Path, header: list[str], rows: list[list[str]]) -> list[list[Any]]:
+    """Columns of a CSV file's rows; empty lines are skipped."""
+    for line, row in enumerate(rows, 2):
+        if row and len(row) != len(header):
+            raise UserError(f"{path}, line {line} has {len(row)} values under {len(header)} columns; mend that line")
+    filled = [row for row in rows if row]
+    return [[row[i] for row in filled] for i in range(len(header))]
+
+
+def _chosen(path: Path, columns: dict[str, list[Any]], choices: tuple[tuple[str, ...], ...]) -> tuple[str, ...]:
+    """The one choice whose columns are there."""
+    there = [names for names in choices if all(name in columns for name in names)]
+    if len(there) == 1 and FRAME in columns:
+        return there[0]
+    if len(there) > 1:
+        raise UserError(f"{path} has columns {there[0][0]} and {there[1][0]}, two forms of the same; leave one out")
+    shown = ", ".join(list(columns)[:20]) or "none"
+    raise UserError(f"{path} has the columns {shown}; a file of poses needs {FORM}")
+
+
+def _numbers(path: Path, name: str, values: list[Any]) -> Array:
+    """Values as floats; None and empty text are NaN."""
+    numbers = np.full(len(values), np.nan)
+    for i, value in enumerate(values):
+        if value is None or (isinstance(value, str) and not value.strip()):
+            continue
+        try:
+            numbers[i] = float(value)
+        except (TypeError, ValueError):
+            raise UserError(f"{path}, row {i + 1}: {name} is {value!r}, which is not a number; mend it") from None
+    return numbers
+
+
+def _frames(path: Path, numbers: Array) -> list[int]:
+    if not len(numbers):
+        raise UserError(f"{path} holds no poses; give --poses a file with a row for each image")
+    wrong = np.flatnonzero(~(np.isfinite(numbers) & (numbers == np.round(numbers))))
+    if len(wrong):
+        raise UserError(f"{path}, row {wrong[0] + 1}: frame_id is {numbers[wrong[0]]:g}; it must be a whole number")
+    frames = [int(number) for number in numbers]
+    values, counts = np.unique(frames, return_counts=True)
+    if np.any(counts > 1):
+        raise UserError(f"{path} has frame_id {values[counts > 1][0]} more than once; give one pose for each frame")
+    return frames
+
+
+def _pose(path: Path, frame: int, rotation: Array, t: Array) -> Answer:
+    """One row's pose. rotation: (4,) quaternion or (9,) matrix row by row."""
+    if np.all(np.isnan(rotation)) and np.all(np.isnan(t)):
+        return Answer(Failure.NO_SOLUTION)
+    where = f"{path}, frame_id {frame}"
+    if not (np.all(np.isfinite(rotation)) and np.all(np.isfinite(t))):
+        raise UserError(f"{where}: the pose has values that are not finite; a failure leaves all of them empty")
+    if len(rotation) == len(QUATERNION):
+        length = float(np.linalg.norm(rotation))
+        if abs(length - 1.0) > TOLERANCE:
+            raise UserError(f"{where}: the quaternion has length {length:.6g}; it must be 1 to within {TOLERANCE:g}")
+        return found(Pose.from_quaternion(rotation, t).R, t)
+    R = rotation.reshape(3, 3)
+    off = float(np.abs(R.T @ R - np.eye(3)).max())
+    if off > TOLERANCE or np.linalg.det(R) < 0.0:
+        fault = f"R^T R is off by {off:.3g}" if off > TOLERANCE else "it mirrors"
+        raise UserError(f"{where}: r11 to r33 are no rotation: {fault}; write it row by row, to within {TOLERANCE:g}")
+    return found(R, t)
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).split("\n")[0].rstrip(".")

@@ -1,0 +1,82 @@
+"""Stage 4: errors of every estimate against the truth. Errors are estimate minus truth; failures keep their rows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+
+from datasets.rows import poses, table
+from datasets.schema import COMPONENTS, SCORES
+from datasets.store.dataset import Dataset
+from eposit.arrays import Array
+from eposit.pose import euler_error_rad, rotation_error_rad, rotation_error_vector
+
+KEY = ("frame_id", "solver", "points", "camera", "use", "draw", "status")
+STAR_FACTOR = 2.0  # the paper's star: "at least twice larger than the ground truth"
+
+
+def targets(dataset: Dataset) -> list[Path]:
+    """Estimate shards, each of which gets a shard of scores."""
+    return dataset.shards("estimates")
+
+
+def is_done(dataset: Dataset, estimates: Path) -> bool:
+    """Whether the scores of a shard of estimates are there."""
+    return dataset.is_done(_path(dataset, estimates))
+
+
+def forget(dataset: Dataset, estimates: Path) -> None:
+    """Remove the scores of a shard of estimates that is about to change.
+
+    Raises:
+        UserError: the disk or its permissions refuse.
+    """
+    dataset.remove_shard(_path(dataset, estimates))
+
+
+def run_shard(dataset: Dataset, estimates: Path) -> None:
+    """Make one shard of `scores`."""
+    rows = dataset.read_shard(estimates)
+    frames = dataset.sibling(estimates, "frames")
+    truth = dataset.read_shard(frames, ["frame_id", *(f"q_{a}" for a in "wxyz"), *(f"t_{a}_mm" for a in "xyz")])
+    place = {frame: i for i, frame in enumerate(truth["frame_id"].to_pylist())}
+    true = poses(truth.take([place[frame] for frame in rows["frame_id"].to_pylist()]))
+    found = poses(rows)
+    t_error = found.t - true.t
+    euler = np.degrees(euler_error_rad(found.R, true.R))
+    failed = rows["status"].to_numpy(zero_copy_only=False) != "ok"
+    length = np.linalg.norm(found.t, axis=1)
+    with np.errstate(invalid="ignore"):
+        star = failed | (length >= STAR_FACTOR * np.linalg.norm(true.t, axis=1))
+    columns = {name: rows[name] for name in KEY}
+    scores = {
+        "rotation_error_deg": np.degrees(rotation_error_rad(found.R, true.R)),
+        **{f"r{axis}_error_deg": euler[:, i] for i, axis in enumerate("xyz")},
+        **{f"t{axis}_error_mm": t_error[:, i] for i, axis in enumerate("xyz")},
+        "t_error_relative": np.linalg.norm(t_error, axis=1) / np.linalg.norm(true.t, axis=1),
+        "reprojection_rmse_px": rows["reprojection_rmse_px"],
+        "star": star,
+        **_normalised(rows, rotation_error_vector(found.R, true.R), t_error),
+    }
+    arrays = {
+        name: value.combine_chunks() if hasattr(value, "combine_chunks") else value
+        for name, value in (columns | scores).items()
+    }
+    dataset.write_shard(_path(dataset, estimates), table(SCORES, arrays))
+
+
+def _normalised(rows: pa.Table, rotation: Array, translation: Array) -> dict[str, Array]:
+    """Errors over their stated standard deviations, NaN without them.
+
+    rotation: (b, 3) vectors on the left, rad. translation: (b, 3) mm.
+    """
+    stated = rows["covariance"].combine_chunks().flatten().to_numpy(zero_copy_only=False).reshape(-1, 6, 6)
+    with np.errstate(invalid="ignore"):
+        values = np.hstack((rotation, translation)) / np.sqrt(np.einsum("bii->bi", stated))
+    return {f"{name}_normalised": values[:, i] for i, name in enumerate(COMPONENTS)}
+
+
+def _path(dataset: Dataset, estimates: Path) -> Path:
+    return dataset.root / "scores" / estimates.name

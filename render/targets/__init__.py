@@ -1,0 +1,1 @@
+"""Calibration targets: which points they have, where their brightness jumps, and how they reflect light."""

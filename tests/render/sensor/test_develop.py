@@ -1,0 +1,234 @@
+"""The sensor model against closed forms, counted areas and renders of the moved board."""
+
+import dataclasses
+
+import cv2
+import numpy as np
+import pytest
+from scipy.stats import kstest, norm
+
+from eposit import Camera, Pose
+from eposit.pose import rotation_from_euler
+from render.frame import render_master
+from render.light import Light
+from render.sensor.develop import LEAST_MOTION_PX, SHORT_PX, Shot, develop
+from render.sensor.motion import Rate, at_pixels, way_at_nodes
+from render.sensor.noise import normals
+from render.sensor.optics import disc_kernel, vignetting_gain
+from render.sensor.presets import SensorModel, regime_of, regimes
+from render.targets.chessboard import Target
+
+TARGET = Target()
+CAMERA = Camera(lens="perspective", fx=400.0, fy=400.0, cx=199.5, cy=149.5, width=400, height=300)
+FACING = Pose(np.eye(3), np.array([0.0, 0.0, 2000.0]) - TARGET.board_centre)
+STILL = Rate(np.zeros(3), np.zeros(3))
+WHOLE = (0, 0, CAMERA.width, CAMERA.height)
+BARE = SensorModel(exposure=1.0, psf_sigma_px=0.0)
+
+
+def shot(seed=0, rate=STILL, pose=FACING, camera=CAMERA, region=WHOLE):
+    return Shot(TARGET, camera, pose, rate, region, seed)
+
+
+def flat(value):
+    return np.full((CAMERA.height, CAMERA.width), value, np.float32)
+
+
+@pytest.mark.parametrize("gamma", [1.0, 2.2])
+@pytest.mark.parametrize("sigma", [0.0, 0.7, 1.5])
+def test_without_noise_the_bits_are_those_of_blur_and_rounding(sigma, gamma):
+    light = np.random.default_rng(1).uniform(0.0, 1.5, (90, 120)).astype(np.float32)
+    before = light.copy()
+    size = 2 * int(np.ceil(5.0 * sigma)) + 1
+    spread = cv2.GaussianBlur(light, (size, size), sigma, borderType=cv2.BORDER_REPLICATE) if sigma else light
+    linear = np.clip(spread * np.float32(0.8), 0.0, 1.0)
+    expected = np.rint((linear if gamma == 1.0 else linear ** np.float32(1.0 / gamma)) * np.float32(255.0))
+    model = SensorModel(psf_sigma_px=sigma, gamma=gamma)
+    np.testing.assert_array_equal(develop(light, model), expected.astype(np.uint8))
+    np.testing.assert_array_equal(develop(light, model, shot()), expected.astype(np.uint8))
+    np.testing.assert_array_equal(light, before)  # the master is developed again and again
+
+
+@pytest.mark.parametrize("radius", [0.3, 0.5, 0.8, 1.0, 2.3, 5.7])
+def test_the_disc_covers_the_area_that_is_counted(radius):
+    kernel = disc_kernel(radius)
+    n, reach = 201, len(kernel) // 2
+    fine = (np.arange(n * len(kernel)) + 0.5) / n - 0.5 - reach
+    inside = np.hypot(fine[None], fine[:, None]) <= radius
+    counted = inside.reshape(len(kernel), n, len(kernel), n).mean(axis=(1, 3)) / (np.pi * radius**2)
+    # A pixel's border of length 1 crosses 201 cells, half of each is counted wrongly at random.
+    np.testing.assert_allclose(kernel, counted, atol=1e-3 / radius**2)
+    assert kernel.sum() == pytest.approx(1.0, abs=1e-6)
+    assert counted.sum() == pytest.approx(1.0, abs=1e-3)  # no part of the disc lies beyond the kernel
+
+
+def test_corners_lose_light_by_the_cos4_law():
+    gain = vignetting_gain(400, 300, 0.4)
+    assert gain[0, 0] == gain[-1, -1] == pytest.approx(0.6, abs=1e-6)
+    assert gain[149:151, 199:201].min() > 0.9999
+    slope = np.sqrt(1.0 / np.sqrt(0.6) - 1.0)  # tangent of the angle to the corner
+    for x, y in ((0, 0), (10, 200), (390, 20)):
+        radius = np.hypot(x - 199.5, y - 149.5) / np.hypot(199.5, 149.5)
+        assert gain[y, x] == pytest.approx(np.cos(np.arctan(slope * radius)) ** 4, abs=1e-6)
+    grey = develop(flat(0.5), dataclasses.replace(BARE, vignetting=0.4))
+    np.testing.assert_array_equal(grey, np.rint(127.5 * gain).astype(np.uint8))
+
+
+def test_uneven_light_is_a_plane_in_a_direction_of_the_frame():
+    model = dataclasses.replace(BARE, uneven=0.3)
+    x, y = np.meshgrid(np.arange(400) - 199.5, np.arange(300) - 149.5)
+    corner, directions = np.hypot(199.5, 149.5), []
+    for seed in range(3):
+        grey = develop(flat(0.5), model, shot(seed)).astype(float)
+        (a, b, c), *_ = np.linalg.lstsq(
+            np.stack((x.ravel(), y.ravel(), np.ones(x.size)), axis=1), grey.ravel(), rcond=None
+        )
+        assert np.abs(grey - a * x - b * y - c).max() <= 0.51  # rounding is half a grey level
+        assert c == pytest.approx(127.5, abs=0.01)
+        assert np.hypot(a, b) * corner == pytest.approx(0.3 * 127.5, rel=1e-3)
+        directions.append(np.arctan2(b, a))
+    assert len(set(np.round(directions, 3))) == 3
+
+
+@pytest.mark.parametrize("signal", [0.0, 0.1, 0.5, 0.9])
+def test_noise_has_the_mean_and_variance_of_electrons(signal):
+    model = dataclasses.replace(BARE, full_well_e=2000.0, read_noise_e=20.0)
+    grey = develop(flat(signal), model, shot(3)).astype(float)
+    variance = 255.0**2 * (signal * 2000.0 + 400.0) / 2000.0**2 + 1.0 / 12.0  # rounding adds a twelfth
+    n = grey.size
+    if signal == 0.0:  # the negative half is clipped: of deviation s the mean is s / sqrt(2 pi)
+        expected = np.sqrt(variance / (2.0 * np.pi))
+        assert grey.mean() == pytest.approx(expected, abs=0.03)  # rounding at the clip moves 0.02
+        return
+    assert grey.mean() == pytest.approx(255.0 * signal, abs=4.0 * np.sqrt(variance / n))  # four standard errors
+    assert grey.var() == pytest.approx(variance, rel=4.0 * np.sqrt(2.0 / n))
+    # Neighbours have nothing to do with each other: a correlation of n pixels has standard error n^-1/2.
+    rest = (grey - grey.mean()) / grey.std()
+    assert abs(np.mean(rest[:, 1:] * rest[:, :-1])) < 4.0 / np.sqrt(n)
+    assert abs(np.mean(rest[1:] * rest[:-1])) < 4.0 / np.sqrt(n)
+
+
+def test_the_noise_is_gaussian():
+    z = normals(1_000_003, np.random.SFC64(5))
+    assert z.dtype == np.float32
+    assert len(z) == 1_000_003
+    assert kstest(z, norm.cdf).pvalue > 0.01
+    assert abs(np.mean(z**4) - 3.0) < 4.0 * np.sqrt(96.0 / len(z))  # the fourth power has variance 96
+
+
+def test_the_seed_decides_the_noise_everywhere():
+    model = regimes()["typical"]
+    first, again, other = (develop(flat(0.5), model, shot(seed)) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(first, again)
+    blocks = (first != other).reshape(10, 30, 10, 40).mean(axis=(1, 3))
+    assert blocks.min() > 0.5
+
+
+def blurred_edge(x, way, sigma):
+    """A step at 0 that goes a way about there, seen through a gaussian: the integral of its distribution function."""
+
+    def integral(u):
+        return u * norm.cdf(u / sigma) + sigma * norm.pdf(u / sigma)
+
+    return norm.cdf(x / sigma) if way == 0.0 else (integral(x + way / 2) - integral(x - way / 2)) / way
+
+
+@pytest.mark.parametrize("way", [0.3, 0.49, 1.0, 3.0, 8.0])
+def test_motion_is_an_even_way_about_the_middle(way):
+    """An edge goes `way` px while the board moves; it widens by the closed form and stays where it is."""
+    sigma, place = 1.0, 199.5 + 0.27
+    rate = Rate(np.array([way * 2000.0 / 400.0 / 0.01, 0.0, 0.0]), np.zeros(3))  # px to mm at 2 m, in 10 ms
+    x = np.arange(400) - place
+    light = np.tile(norm.cdf(x / sigma), (300, 1)).astype(np.float32)
+    model = dataclasses.replace(BARE, exposure_s=0.01)
+    grey = develop(light, model, shot(rate=rate)).astype(float)[150]
+    expected = 255.0 * blurred_edge(x, way, sigma)
+    near = np.abs(x) < 30
+    # Half a grey level of rounding; the nine weights of short ways are within 0.2 and Lanczos within 0.3 of the truth.
+    assert np.abs(grey - expected)[near].max() < (0.75 if way <= SHORT_PX else 0.85)
+    # The middle of the edge from its moment: 60 roundings of 0.3 px shift it by 0.3 sqrt(60) / 255 = 0.009.
+    assert np.sum(grey[near] - 255.0 * (x[near] > 0)) / 255.0 == pytest.approx(
+        np.sum(expected[near] - 255.0 * (x[near] > 0)) / 255.0, abs=0.02
+    )
+
+
+@pytest.mark.parametrize("way", [0.45, 2.0])
+@pytest.mark.parametrize("along", [False, True])
+def test_only_motion_across_an_edge_blurs_it(way, along):
+    """An edge at 0.6 rad, so that its pixels lie at all distances from it, and motion across or along it."""
+    across, aside = np.array([np.cos(0.6), np.sin(0.6)]), np.array([-np.sin(0.6), np.cos(0.6)])
+    x, y = np.meshgrid(np.arange(400) - 199.3, np.arange(300) - 149.6)
+    distance = across[0] * x + across[1] * y
+    velocity = np.append(aside if along else across, 0.0) * way * 5.0 / 0.01
+    model = dataclasses.replace(BARE, exposure_s=0.01)
+    light = norm.cdf(distance).astype(np.float32)
+    grey = develop(light, model, shot(rate=Rate(velocity, np.zeros(3)))).astype(float)
+    expected = 255.0 * blurred_edge(distance, 0.0 if along else way, 1.0)
+    error = (grey - expected)[(np.abs(distance) < 2.0) & (np.abs(y) < 60)]
+    # Half a level of rounding. OpenCV rounds places to 1/32 px, by up to 1/64 px, where the edge rises 100 levels a px;
+    # of those 1.6 levels the mean of four moments keeps a third.
+    assert np.abs(error).max() < 1.0
+    # Rounding alone is 0.29, that of the places adds as much again. In short ways the wrong diagonal would add half the
+    # variance, way^2 / 24, times the bend of the edge, up to 62 grey levels per px^2: 0.5 at the least.
+    assert np.sqrt(np.mean(error**2)) < (0.36 if way <= SHORT_PX else 0.45)
+
+
+def test_a_way_too_short_to_be_seen_changes_nothing():
+    light = np.random.default_rng(0).uniform(0.0, 1.0, (300, 400)).astype(np.float32)
+    rate = Rate(np.array([0.9 * LEAST_MOTION_PX * 5.0 / 0.01, 0.0, 0.0]), np.zeros(3))
+    model = dataclasses.replace(BARE, exposure_s=0.01)
+    np.testing.assert_array_equal(develop(light, model, shot(rate=rate)), develop(light, BARE))
+
+
+@pytest.mark.parametrize("lens", ["perspective", "orthogonal"])
+def test_the_way_of_a_pixel_is_that_of_the_board(lens):
+    camera = CAMERA.replace(lens=lens, fx=180.0, fy=181.0)
+    R = rotation_from_euler(np.deg2rad([30.0, 20.0, 15.0]))
+    pose = Pose(R, np.array([50.0, -30.0, 1300.0]) - R @ TARGET.board_centre)
+    rate = Rate(np.array([90.0, -60.0, 120.0]), np.array([0.2, -0.4, 0.5]))
+    way_x, way_y = at_pixels(way_at_nodes(TARGET, camera, pose, rate, 0.05, WHOLE), 400, 300)
+    ends = [camera.project(rate.moved(pose, s).apply(TARGET.corners)) for s in (0.025, -0.025)]
+    pixels = np.rint(camera.project(pose.apply(TARGET.corners))).astype(int)
+    found = np.stack((way_x, way_y), axis=-1)[pixels[:, 1], pixels[:, 0]]
+    # Corners lie up to 0.7 px beside their pixel; the turn of 0.03 rad alone changes the way by 0.02 px over that.
+    np.testing.assert_allclose(found, ends[0] - ends[1], atol=0.03)
+    assert np.hypot(way_x, way_y).max() < 3.0 * np.hypot(*(ends[0] - ends[1]).T).max()  # bounded beyond the board
+
+
+def test_the_blur_is_the_mean_of_renders_on_the_way():
+    """Sixteen masters of the board at moments of the exposure, against one master and its motion."""
+    camera = CAMERA.replace(lens="equidistance", fx=190.0, fy=190.0)
+    R = rotation_from_euler(np.deg2rad([25.0, -20.0, 10.0]))
+    pose = Pose(R, np.array([30.0, 20.0, 1200.0]) - R @ TARGET.board_centre)
+    rate = Rate.about(pose, TARGET.board_centre, np.array([500.0, 200.0, 300.0]), np.array([0.0, 0.5, 1.5]))
+    model = SensorModel(exposure_s=0.04)
+    moments = (np.arange(16) + 0.5) / 16.0 - 0.5
+
+    def light(at, samples):
+        return render_master(TARGET, Light(), camera, at, samples=samples, seed=1).full(camera)
+
+    mean = np.mean([light(rate.moved(pose, s * 0.04), 64) for s in moments], axis=0, dtype=np.float64)
+    expected = develop(mean.astype(np.float32), SensorModel()).astype(float)
+    still = light(pose, 256)
+    found = develop(still, model, shot(rate=rate, pose=pose, camera=camera)).astype(float)
+    moved, unmoved = (np.sqrt(np.mean((picture - expected) ** 2)) for picture in (found, develop(still, SensorModel())))
+    assert unmoved > 5.0  # the motion, 2 to 4 px, is plain to see
+    assert moved < 0.6  # two roundings, 0.4; 64 rays; the raised circle, which moves by another way
+
+
+def test_frames_are_asked_for_where_they_matter():
+    for change in ({"full_well_e": 100.0}, {"uneven": 0.1}, {"exposure_s": 0.1}):
+        with pytest.raises(ValueError, match="give the frame"):
+            develop(flat(0.5), dataclasses.replace(BARE, **change))
+
+
+def test_regimes_have_names_and_harsh_is_worse_than_typical():
+    named = regimes()
+    assert list(named) == ["clean", "typical", "paper", "harsh"]
+    assert named["clean"] == SensorModel()
+    assert [regime_of(model) for model in named.values()] == list(named)
+    assert regime_of(dataclasses.replace(named["harsh"], gamma=2.0)) is None
+    typical, harsh = named["typical"], named["harsh"]
+    for name in ("psf_sigma_px", "defocus_radius_px", "exposure_s", "vignetting", "uneven", "read_noise_e"):
+        assert getattr(harsh, name) > getattr(typical, name)
+    assert harsh.full_well_e < typical.full_well_e
