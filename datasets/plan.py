@@ -16,7 +16,7 @@ from datasets.trajectories.field import FieldAngles
 from datasets.trajectories.helix import Helix
 from datasets.trajectories.listed import Listed
 from datasets.trajectories.scatter import MAX_TRIES, Scatter
-from datasets.trajectories.view import View, hand_held
+from datasets.trajectories.view import PosedFrame, hand_held
 from eposit import Pose
 from render.sensor.motion import Rate
 from render.sensor.presets import SensorModel
@@ -93,7 +93,7 @@ def shard_count(recipe: Recipe) -> int:
     return -(-frame_count(recipe) // recipe.shard_frames)
 
 
-def _views(recipe: Recipe) -> Iterator[View]:
+def _views(recipe: Recipe) -> Iterator[PosedFrame]:
     path, target = recipe.trajectory, recipe.target
     if isinstance(path, Helix):
         for time_s in path.times():
@@ -102,7 +102,7 @@ def _views(recipe: Recipe) -> Iterator[View]:
     for pose_id, (pose, defocus) in enumerate(_stands(path, recipe)):
         rng = rng_for(recipe.seed, Stream.HAND, pose_id)
         rate = hand_held(pose, target, path.speed_mm_per_s, path.turn_deg_per_s, rng)
-        yield View(float(pose_id), pose, rate, defocus)
+        yield PosedFrame(float(pose_id), pose, rate, defocus)
 
 
 def _stands(path: FieldAngles | Scatter | Listed, recipe: Recipe) -> Iterable[tuple[Pose, float | None]]:
@@ -113,7 +113,7 @@ def _stands(path: FieldAngles | Scatter | Listed, recipe: Recipe) -> Iterable[tu
     return ((pose, None) for pose in poses)
 
 
-def _sensor(recipe: Recipe, view: View) -> SensorModel:
+def _sensor(recipe: Recipe, view: PosedFrame) -> SensorModel:
     if view.defocus_radius_px is None:
         return recipe.sensor
     return replace(recipe.sensor, defocus_radius_px=view.defocus_radius_px)

@@ -44,8 +44,11 @@ def estimate_rows(
     b = len(frame_ids)
     columns = {
         "frame_id": frame_ids,
-        **{name: [value] * b for name, value in zip(("solver", "points", "camera", "use"), key, strict=True)},
-        "draw": draws,
+        **{
+            name: [value] * b
+            for name, value in zip(("solver", "point_source", "assumed_camera", "point_set"), key, strict=True)
+        },
+        "noise_draw": draws,
         "status": found.status,
         "n_points": np.full(b, points),
         **pose_columns(found.cam_from_obj.R, found.cam_from_obj.t),

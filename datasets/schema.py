@@ -27,13 +27,13 @@ _KEY = [
     _field("frame_id", pa.int64(), "frame"),
     _field("solver", pa.string(), "solver, function or file of poses that made the estimate"),
     _field(
-        "points",
+        "point_source",
         pa.string(),
         "image points it was given: detected (by which detector), truth, or truth with noise; image: the image alone",
     ),
-    _field("camera", pa.string(), "camera it assumed: exact, nominal or paper"),
-    _field("use", pa.string(), "object points it used: four or all"),
-    _field("draw", pa.int32(), "draw of the point noise; 0 where there is none"),
+    _field("assumed_camera", pa.string(), "camera it assumed: exact, nominal or paper"),
+    _field("point_set", pa.string(), "object points it used: four or all"),
+    _field("noise_draw", pa.int32(), "draw of the point noise; 0 where there is none"),
 ]
 
 FRAMES = pa.schema(
@@ -151,7 +151,9 @@ SCORES = pa.schema(
                 },
             }
         ),
-        _field("star", pa.bool_(), "the paper's star: no solution, or a translation at least twice the true one"),
+        _field(
+            "gross_failure", pa.bool_(), "the paper's star: no solution, or a translation at least twice the true one"
+        ),
     ]
 )
 

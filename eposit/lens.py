@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from eposit.arrays import Array, Mask
 
-Law = Callable[[Array], Array]
+LensFunction = Callable[[Array], Array]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,10 +24,10 @@ class Lens:
     """One law. The raw functions are smooth and unmasked; `rho` and `theta` mask what the lens cannot see."""
 
     name: str
-    raw_rho: Law  # normalised radius from theta (rad)
-    raw_slope: Law  # d rho / d theta from theta (rad)
-    raw_g: Law  # sin(theta) / rho(theta), finite at 0
-    raw_theta: Law  # theta (rad) from normalised radius
+    raw_rho: LensFunction  # normalised radius from theta (rad)
+    raw_slope: LensFunction  # d rho / d theta from theta (rad)
+    raw_g: LensFunction  # sin(theta) / rho(theta), finite at 0
+    raw_theta: LensFunction  # theta (rad) from normalised radius
     theta_max: float  # rad, the largest incidence angle
     includes_max: bool  # whether theta_max itself has an image
     rho_max: float  # normalised radius at theta_max, possibly infinite
@@ -57,7 +57,7 @@ class Lens:
         angle = self.raw_theta(np.where(reached, radius, 0.0))
         return np.where(reached & self.sees(angle), angle, np.nan)
 
-    def _masked(self, law: Law, theta: ArrayLike) -> Array:
+    def _masked(self, law: LensFunction, theta: ArrayLike) -> Array:
         angle = np.asarray(theta, dtype=np.float64)
         seen = self.sees(angle)
         return np.where(seen, law(np.where(seen, angle, 0.0)), np.nan)
@@ -177,7 +177,7 @@ def kannala_brandt(coefficients: tuple[float, ...]) -> Lens:
     )
 
 
-def _invert_rising(law: Law, slope: Law, rho: Array, theta_max: float) -> Array:
+def _invert_rising(law: LensFunction, slope: LensFunction, rho: Array, theta_max: float) -> Array:
     """Newton's method kept inside a shrinking bracket, so that a flat slope at theta_max cannot throw it out."""
     low, high = np.zeros_like(rho), np.full_like(rho, theta_max)
     theta = np.minimum(rho, theta_max)

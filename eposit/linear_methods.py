@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from eposit.arrays import Array, Mask, pick
-from eposit.posit.iteration import Start, posit
+from eposit.arrays import Array, Mask, take_last
+from eposit.pose import PoseBatch
+from eposit.posit.iteration import posit
 from eposit.posit.newton import CONTRACTS
 from eposit.posit.orthography import Orthography
 from eposit.shape import Shape
@@ -18,7 +19,7 @@ QUICK = 40  # iterations to a relative change of 1e-12: half of it in each step
 EXACT_MISFIT = 1e-7  # misfit over spread of a triangle's pose that shows noise-free points, which EPOSIT then must fit
 
 
-def posit_checked(shape: Shape, image: Array, tol: float, max_iterations: int) -> tuple[Start, Mask, Array]:
+def posit_checked(shape: Shape, image: Array, tol: float, max_iterations: int) -> tuple[PoseBatch, Mask, Array]:
     """`posit`, retried inside its limit; a (b,) mask of the poses that reproduce their points; how well they do.
 
     The last is (2, b), the sums of the squared distances in x and in y between reprojections and pinhole points.
@@ -43,7 +44,7 @@ def posit_checked(shape: Shape, image: Array, tol: float, max_iterations: int) -
     doubtful = np.flatnonzero(~clear & np.isfinite(spread))
     if not len(doubtful):
         return start, misfit <= limit, squares
-    some = pick(image, doubtful)
+    some = take_last(image, doubtful)
     rays = np.stack((some[0], some[1], np.ones_like(some[0])), axis=1)
     ((R, t),) = p3p_poses(points_in_obj, rays / np.sqrt(np.einsum("nib,nib->nb", rays, rays))[:, None], 1)
     exact = _rms(_squares(points_in_obj, some, R, t)[0], points_in_obj) <= EXACT_MISFIT * spread[doubtful]
@@ -55,7 +56,9 @@ def posit_checked(shape: Shape, image: Array, tol: float, max_iterations: int) -
         k = forward * (system.reach / (t[2, again] + points_in_obj[0] @ forward))
         rows = doubtful[again]
         start.put(rows, posit(system.take(rows), tol, max_iterations, k, 0.5))
-        squares[:, rows], _ = _squares(points_in_obj, pick(image, rows), pick(start.R, rows), pick(start.t, rows))
+        squares[:, rows], _ = _squares(
+            points_in_obj, take_last(image, rows), take_last(start.R, rows), take_last(start.t, rows)
+        )
         misfit[rows] = _rms(squares[:, rows], points_in_obj)
     return start, misfit <= limit, squares
 

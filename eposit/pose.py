@@ -8,10 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from eposit.arrays import Array
+from eposit.arrays import Array, Mask, take_last
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +47,25 @@ class Pose:
         quaternion = np.asarray(wxyz, dtype=np.float64)
         matrices = Rotation.from_quat(np.roll(quaternion.reshape(-1, 4), -1, axis=-1)).as_matrix()
         return Pose(matrices.reshape(*quaternion.shape[:-1], 3, 3), np.asarray(t, dtype=np.float64))
+
+
+@dataclass(frozen=True, slots=True)
+class PoseBatch:
+    """Poses from a start or a search; rows that failed may be NaN."""
+
+    R: Array  # (3, 3, b)
+    t: Array  # (3, b), unit of the object points
+    iterations: NDArray[np.int64]  # (b,)
+    converged: Mask  # (b,)
+
+    def put(self, rows: NDArray[np.int64], other: PoseBatch) -> None:
+        """Overwrite some rows with those of another result; iterations add up."""
+        self.R[..., rows], self.t[:, rows], self.converged[rows] = other.R, other.t, other.converged
+        self.iterations[rows] += other.iterations
+
+    def take(self, rows: NDArray[np.int64]) -> PoseBatch:
+        """Some of the rows."""
+        return PoseBatch(take_last(self.R, rows), take_last(self.t, rows), self.iterations[rows], self.converged[rows])
 
 
 def rotation_from_euler(angles: ArrayLike) -> Array:

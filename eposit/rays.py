@@ -11,7 +11,7 @@ import numpy as np
 from eposit.arrays import Array
 from eposit.camera import Camera
 
-RIM_ALLOWANCE = 0.01  # image points this fraction outside the lens's image circle are noise, not errors
+IMAGE_CIRCLE_ALLOWANCE = 0.01  # image points this fraction outside the lens's image circle are noise, not errors
 
 
 def unit_rays(camera: Camera, seen: Array) -> Array:
@@ -31,13 +31,13 @@ def unit_rays(camera: Camera, seen: Array) -> Array:
     return rays
 
 
-def inside_rim(camera: Camera, seen: Array) -> Array:
+def onto_image_circle(camera: Camera, seen: Array) -> Array:
     """Points just outside the image circle drawn onto it: near 90 degrees noise alone moves them out."""
     limit = camera.law.rho_max
     if not np.isfinite(limit):
         return seen
     excess = np.hypot(seen[:, 0], seen[:, 1]) / limit
-    outside = (excess > 1.0) & (excess <= 1.0 + RIM_ALLOWANCE)
+    outside = (excess > 1.0) & (excess <= 1.0 + IMAGE_CIRCLE_ALLOWANCE)
     if not np.any(outside):
         return seen
     return seen * np.where(outside, (1.0 - 1e-12) / np.maximum(excess, 1.0), 1.0)[:, None]

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eposit.arrays import Array, Mask, cross, pick
+from eposit.arrays import Array, Mask, cross, take_last
 from eposit.camera import Camera
 from eposit.posit.orthography import lengths, nearest_frame
 from eposit.problem import Problem, mark, validate
@@ -119,8 +119,8 @@ def _iterate(
             if not np.all(keep) or count == max_iterations:
                 result[..., active], iterations[active] = vectors, count
                 rows = np.flatnonzero(keep)
-                active, epsilon, vectors = active[rows], pick(epsilon, rows), pick(vectors, rows)
-                flat, g0 = pick(flat, rows), g0[rows]
+                active, epsilon, vectors = active[rows], take_last(epsilon, rows), take_last(vectors, rows)
+                flat, g0 = take_last(flat, rows), g0[rows]
             if count == 1:
                 flat, g0 = image[..., active] / ratio[:, active], ratio[0, active]
             previous = vectors

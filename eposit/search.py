@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from eposit.arrays import Array, pick
-from eposit.posit.iteration import Start
+from eposit.arrays import Array, take_last
+from eposit.pose import PoseBatch
 from eposit.refine.ldl6 import factorise, inverse
-from eposit.refine.minimise import Minima, descend
-from eposit.refine.reprojection import View, cost, equations, residuals
+from eposit.refine.minimise import RefinedPoses, descend
+from eposit.refine.reprojection import Observations, cost, equations, residuals
 from eposit.shape import Shape
 from eposit.starts import centred_start, other_starts
 from eposit.starts.p3p import ray_misfit
 
 
-def best_poses(shape: Shape, view: View, rays: Array, refined: bool) -> Minima:
+def best_poses(shape: Shape, view: Observations, rays: Array, refined: bool) -> RefinedPoses:
     """The poses of lowest cost. rays: (n, 3, b). refined: whether starts are refined before costs are compared."""
     first = centred_start(shape, rays)
     if first is None:
@@ -26,23 +26,23 @@ def best_poses(shape: Shape, view: View, rays: Array, refined: bool) -> Minima:
         sure &= shape.sure(found.poses.R, found.poses.t, misfit)
     unsure = np.flatnonzero(~sure)
     if len(unsure):
-        part, part_rays = view.take(unsure), pick(rays, unsure)
+        part, part_rays = view.take(unsure), take_last(rays, unsure)
         others = _each_refined(part, other_starts(shape, part_rays), refined)
         found.replace(unsure, _lowest([found.take(unsure), *others]))
     return found
 
 
-def _refined(view: View, start: Start, refined: bool) -> Minima:
+def _refined(view: Observations, start: PoseBatch, refined: bool) -> RefinedPoses:
     if refined:
         return descend(view, start)
     spread = inverse(factorise(equations(view, start.R, start.t).normal))
-    return Minima(start, cost(residuals(view, start.R, start.t)), spread)
+    return RefinedPoses(start, cost(residuals(view, start.R, start.t)), spread)
 
 
-def _each_refined(view: View, found: list[Start], refined: bool) -> list[Minima]:
+def _each_refined(view: Observations, found: list[PoseBatch], refined: bool) -> list[RefinedPoses]:
     """The starts of every problem, refined as one batch: NumPy's calls cost as much for few problems as for many."""
     b = view.seen.shape[-1]
-    together = Start(
+    together = PoseBatch(
         np.concatenate([start.R for start in found], axis=-1),
         np.concatenate([start.t for start in found], axis=-1),
         np.concatenate([start.iterations for start in found]),
@@ -52,7 +52,7 @@ def _each_refined(view: View, found: list[Start], refined: bool) -> list[Minima]
     return [every.take(np.arange(i * b, (i + 1) * b)) for i in range(len(found))]
 
 
-def _lowest(candidates: list[Minima]) -> Minima:
+def _lowest(candidates: list[RefinedPoses]) -> RefinedPoses:
     """For each problem the converged candidate of lowest cost; the earlier one where costs are equal."""
     best = candidates[0].take(np.arange(len(candidates[0].cost)))
     best.cost[~best.poses.converged] = np.inf

@@ -19,7 +19,7 @@ class Status(StrEnum):
     OK = "ok"
     NON_FINITE = "non_finite"  # an image point is NaN or infinite
     OUTSIDE_LENS = "outside_lens"  # an image point that no ray of this lens reaches
-    FIELD_ANGLE = "field_angle"  # a point at or beyond 90 degrees, where POSIT and EPOSIT have no equations
+    BEYOND_90_DEGREES = "beyond_90_degrees"  # a point at or beyond 90 degrees, where POSIT and EPOSIT have no equations
     COPLANAR = "coplanar"  # the points lie in one plane and the method cannot take that
     NOT_CONVERGED = "not_converged"  # the iteration stopped before its step fell below the tolerance
     NO_SOLUTION = "no_solution"  # no real solution of the equations has all points in front of the camera

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eposit.arrays import Array, Mask, pick
+from eposit.arrays import Array, Mask, take_last
 from eposit.camera import Camera
 from eposit.linear_methods import posit_checked
-from eposit.posit.iteration import Start
+from eposit.pose import PoseBatch
 from eposit.problem import Problem, mark, validate
-from eposit.rays import centred_image, inside_rim, rectify_paper, rectify_rays, unit_rays
-from eposit.refine.minimise import Minima
-from eposit.refine.reprojection import View, cost, residuals
+from eposit.rays import centred_image, onto_image_circle, rectify_paper, rectify_rays, unit_rays
+from eposit.refine.minimise import RefinedPoses
+from eposit.refine.reprojection import Observations, cost, residuals
 from eposit.refine.weights import whitening
 from eposit.robust import solve_robust
 from eposit.search import best_poses
@@ -105,7 +105,7 @@ def _solve_linear(
     out: Solution,
 ) -> None:
     back, n = None, len(shape.points_in_obj)
-    view = View.of(problem.camera, problem.points_in_obj, problem.points_px, whitening(None, n))
+    view = Observations.of(problem.camera, problem.points_in_obj, problem.points_px, whitening(None, n))
     plain = method != "centred" and problem.camera.lens == "perspective"
     if plain:
         image = view.seen.transpose(1, 0, 2)  # pinhole points already, and all in front of the camera
@@ -134,8 +134,8 @@ def _solve_linear(
 
 
 def _solve_best(problem: Problem, shape: Shape, refined: bool, out: Solution) -> None:
-    view = View.of(problem.camera, problem.points_in_obj, problem.points_px, problem.weights)
-    rays = unit_rays(problem.camera, inside_rim(problem.camera, view.seen))
+    view = Observations.of(problem.camera, problem.points_in_obj, problem.points_px, problem.weights)
+    rays = unit_rays(problem.camera, onto_image_circle(problem.camera, view.seen))
     _mark_rays(problem.status, rays, False)
     if not shape.usable:
         mark(problem.status, np.ones(len(problem.status), bool), Status.COPLANAR)
@@ -146,11 +146,11 @@ def _solve_best(problem: Problem, shape: Shape, refined: bool, out: Solution) ->
     finish(problem, found, out)
 
 
-def finish(problem: Problem, found: Minima, out: Solution) -> None:
+def finish(problem: Problem, found: RefinedPoses, out: Solution) -> None:
     """Write poses, RMSE and covariance where the status is OK."""
     n, costs, spread = len(problem.points_in_obj), found.cost, found.spread
     if problem.absolute:
-        plain = View.of(problem.camera, problem.points_in_obj, problem.points_px, whitening(None, n))
+        plain = Observations.of(problem.camera, problem.points_in_obj, problem.points_px, whitening(None, n))
         costs = cost(residuals(plain, found.poses.R, found.poses.t))
     else:
         spread = spread * (costs / (2 * n - 6))
@@ -158,10 +158,10 @@ def finish(problem: Problem, found: Minima, out: Solution) -> None:
     if rows is None:
         out.covariance[:] = spread.transpose(2, 0, 1)
     elif len(rows):
-        out.covariance[rows] = pick(spread, rows).transpose(2, 0, 1)
+        out.covariance[rows] = take_last(spread, rows).transpose(2, 0, 1)
 
 
-def _write(out: Solution, status: NDArray[np.int8], found: Start, costs: Array, n: int) -> NDArray[np.int64] | None:
+def _write(out: Solution, status: NDArray[np.int8], found: PoseBatch, costs: Array, n: int) -> NDArray[np.int64] | None:
     """Write poses and RMSE where the status is OK; those rows, None for all."""
     ok = status == OK
     if np.all(ok):
@@ -171,8 +171,8 @@ def _write(out: Solution, status: NDArray[np.int8], found: Start, costs: Array, 
         return None
     rows = np.flatnonzero(ok)
     out.clear()
-    out.cam_from_obj.R[rows] = pick(found.R, rows).transpose(2, 0, 1)
-    out.cam_from_obj.t[rows] = pick(found.t, rows).T
+    out.cam_from_obj.R[rows] = take_last(found.R, rows).transpose(2, 0, 1)
+    out.cam_from_obj.t[rows] = take_last(found.t, rows).T
     out.reprojection_rmse_px[rows] = np.sqrt(costs[rows] / n)
     out.iterations[:] = found.iterations
     return rows
@@ -183,4 +183,4 @@ def _mark_rays(status: NDArray[np.int8], rays: Array, forward: bool) -> None:
     z = np.minimum.reduce(rays[:, 2], axis=0)
     mark(status, np.isnan(z), Status.OUTSIDE_LENS)
     if forward:
-        mark(status, z <= 0.0, Status.FIELD_ANGLE)
+        mark(status, z <= 0.0, Status.BEYOND_90_DEGREES)

@@ -149,7 +149,7 @@ def table(
     return CameraCandidates(Pose(spread[0], spread[1]), np.full((b, width), np.nan), spread[2], spread[3], count)
 
 
-def misses(images: Images, found: CameraCandidates) -> Array:
+def reprojection_squares(images: Images, found: CameraCandidates) -> Array:
     """(b, k) sum of squared reprojection errors, px^2; NaN where a point has no image under the estimated camera."""
     camera = images.camera
     estimated = Division(found.f_px, found.k_per_px2, camera.cx, camera.cy, camera.fy / camera.fx)

@@ -64,12 +64,12 @@ def _lab() -> tuple[str, bool, str]:
 def _render() -> tuple[str, bool, str]:
     from datasets.plan import plan
     from datasets.recipe.model import load_recipe
-    from render.frame import render_master
+    from render.frame import render_frame
 
     recipe, _ = load_recipe("smoke")
     frame = plan(recipe)[0]
     try:
-        master = render_master(
+        master = render_frame(
             recipe.target, recipe.light, frame.camera.true_camera(), frame.cam_from_obj, samples=4, seed=0
         )
     except backend.BackendError as error:

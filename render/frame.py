@@ -24,7 +24,7 @@ REFERENCE_RAYS = 1 << 24  # in flight while the reference is traced
 
 
 @dataclass(frozen=True, slots=True)
-class Master:
+class LinearImage:
     """Linear radiance of a region and of the rest."""
 
     radiance: Image  # (height, width) of the region
@@ -39,7 +39,7 @@ class Master:
         return picture
 
 
-def render_master(
+def render_frame(
     target: Target,
     light: Light,
     camera: Camera,
@@ -49,7 +49,7 @@ def render_master(
     seed: int = 0,
     region: Region | None = None,
     reference: bool = False,
-) -> Master:
+) -> LinearImage:
     """Render one frame in linear light, float32, box filter.
 
     samples: cells of a pixel that edges cross, a square number. region: pixels to render, by default the target's.
@@ -60,11 +60,11 @@ def render_master(
     x, y, width, height = region
     if not reference:
         radiance = trace(target, light, camera, cam_from_obj, region, samples)
-        return Master(radiance, region, light.background)
+        return LinearImage(radiance, region, light.background)
     film = _reference(target, light, camera, cam_from_obj, region, samples, seed)
     behind = np.maximum(lens_coverage(camera)[y : y + height, x : x + width] - film[..., 1], 0.0)
     radiance = film[..., 0] + np.float32(light.background) * behind
-    return Master(radiance.astype(np.float32), region, light.background)
+    return LinearImage(radiance.astype(np.float32), region, light.background)
 
 
 def _reference(

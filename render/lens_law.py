@@ -14,12 +14,12 @@ from eposit import get_lens
 from eposit.lens import KANNALA_BRANDT
 
 INVERSION_STEPS = 24  # Newton steps inside a bracket; float32 needs about 6, a flat slope at the rim more
-NO_RIM = 1e30
-RIM_COSINE = 0.02  # at the rim of an orthogonal lens theta's slope is infinite: over a cell of 0.2 px it is 1 / 0.02
+NO_IMAGE_CIRCLE = 1e30
+LEAST_COSINE = 0.02  # at the rim of an orthogonal lens theta's slope is infinite: over a cell of 0.2 px it is 1 / 0.02
 
 
 @dataclass(frozen=True, slots=True)
-class Law:
+class DeviceLens:
     """A lens law with its numbers as opaque Dr.Jit scalars, so that one kernel serves all cameras of a lens."""
 
     name: str
@@ -28,19 +28,19 @@ class Law:
     theta_max: Any  # rad
 
 
-def opaque_law(mi: Any, dr: Any, name: str, coefficients: tuple[float, ...]) -> Law:
+def device_lens(mi: Any, dr: Any, name: str, coefficients: tuple[float, ...]) -> DeviceLens:
     """The law with its constants uploaded."""
     law = get_lens(name, coefficients)
-    rim = law.rho_max if np.isfinite(law.rho_max) else NO_RIM
-    numbers = [dr.opaque(mi.Float, value) for value in (*coefficients, rim, law.theta_max)]
-    return Law(law.name, numbers[:-2], numbers[-2], numbers[-1])
+    circle = law.rho_max if np.isfinite(law.rho_max) else NO_IMAGE_CIRCLE
+    numbers = [dr.opaque(mi.Float, value) for value in (*coefficients, circle, law.theta_max)]
+    return DeviceLens(law.name, numbers[:-2], numbers[-2], numbers[-1])
 
 
-def sine_cosine(mi: Any, dr: Any, law: Law, rho: Any) -> tuple[Any, Any, Any]:
+def sine_cosine(mi: Any, dr: Any, law: DeviceLens, rho: Any) -> tuple[Any, Any, Any]:
     """sin and cos of theta(rho), each in the form that loses least in float32, and d theta / d rho."""
     if law.name == "orthogonal":
         cosine = dr.safe_sqrt((1.0 - rho) * (1.0 + rho))
-        return rho, cosine, 1.0 / dr.maximum(cosine, RIM_COSINE)
+        return rho, cosine, 1.0 / dr.maximum(cosine, LEAST_COSINE)
     if law.name == "perspective":
         cosine = dr.rsqrt(1.0 + rho * rho)
         return rho * cosine, cosine, cosine * cosine
@@ -49,7 +49,7 @@ def sine_cosine(mi: Any, dr: Any, law: Law, rho: Any) -> tuple[Any, Any, Any]:
     half = 0.5 * rho
     if law.name == "equisolid":  # half is sin(theta / 2)
         root = dr.safe_sqrt((1.0 - half) * (1.0 + half))
-        return 2.0 * half * root, 1.0 - 2.0 * half * half, 1.0 / dr.maximum(root, RIM_COSINE)
+        return 2.0 * half * root, 1.0 - 2.0 * half * half, 1.0 / dr.maximum(root, LEAST_COSINE)
     if law.name == "stereographic":  # half is tan(theta / 2)
         scale = 1.0 / (1.0 + half * half)
         return 2.0 * half * scale, (1.0 - half) * (1.0 + half) * scale, scale
@@ -58,7 +58,7 @@ def sine_cosine(mi: Any, dr: Any, law: Law, rho: Any) -> tuple[Any, Any, Any]:
     return *dr.sincos(theta), 1.0 / slope
 
 
-def _invert_polynomial(mi: Any, dr: Any, law: Law, rho: Any) -> tuple[Any, Any]:
+def _invert_polynomial(mi: Any, dr: Any, law: DeviceLens, rho: Any) -> tuple[Any, Any]:
     """theta of the Kannala-Brandt polynomial and its slope: Newton's method kept inside a shrinking bracket."""
     k1, k2, k3, k4 = law.coefficients
     low, high = mi.Float(0.0), mi.Float(law.theta_max)

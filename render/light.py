@@ -76,7 +76,7 @@ def shading_map(target: Target, light: Light) -> tuple[Array, float]:
     lamp = _smooth_lamp(target, light, points)
     centre = target.circle_centre
     distance = np.hypot(points[..., 0] - centre[0], points[..., 1] - centre[1])
-    near = distance < shade_radius(target, light)
+    near = distance < shadow_radius(target, light)
     lamp[near] = lamp_irradiance(target, light, points[near], LAMP_SAMPLES, shadowed=True)
     blocked = blocked_share(distance, target.circle_radius_mm, target.circle_height_mm)
     ambient = 1.0 - blocked - lamp / np.pi  # neither the circle nor the lamp lets it through
@@ -87,7 +87,7 @@ def shading_map(target: Target, light: Light) -> tuple[Array, float]:
     return lamp_scale * lamp + ambient_scale * ambient, lamp_scale * disc + ambient_scale * (1.0 - disc / np.pi)
 
 
-def shade_radius(target: Target, light: Light) -> float:
+def shadow_radius(target: Target, light: Light) -> float:
     """Distance from the circle's axis, mm, within which the lamp's shadow of it lies on the board."""
     to_lamp = light.lamp_corners(target) - target.circle_centre
     slope = np.max(np.linalg.norm(to_lamp[:, :2] / to_lamp[:, 2:], axis=1))

@@ -10,10 +10,10 @@ from pathlib import Path
 from datasets.errors import UserError
 from datasets.store.atomic import replace_atomically
 from datasets.store.dataset import Dataset, open_dataset, refused
-from datasets.store.linear_images import MasterError, masters, read_master
+from datasets.store.linear_images import LinearImageError, masters, read_linear
 
 
-def borrow_masters(dataset: Dataset, source: Path) -> tuple[int, int]:
+def reuse_linear_images(dataset: Dataset, source: Path) -> tuple[int, int]:
     """Link or copy into a dataset every master that it lacks and that `source` has, by the key of what it shows.
 
     Returns:
@@ -23,7 +23,7 @@ def borrow_masters(dataset: Dataset, source: Path) -> tuple[int, int]:
         UserError: `source` holds no dataset, is this dataset itself, or the disk or its permissions refuse.
     """
     if source.resolve() == dataset.root.resolve():
-        raise UserError(f"--masters {source} is the dataset that is to be made; give the folder of another one")
+        raise UserError(f"--reuse {source} is the dataset that is to be made; give the folder of another one")
     offered = {key: path for path, key in masters(source, open_dataset(source).recipe)}
     lacking = [(path, key) for path, key in masters(dataset.root, dataset.recipe) if not path.is_file()]
     taken = [(path, offered[key]) for path, key in lacking if key in offered and _is_sound(offered[key], key)]
@@ -37,8 +37,8 @@ def borrow_masters(dataset: Dataset, source: Path) -> tuple[int, int]:
 
 def _is_sound(path: Path, key: str) -> bool:
     try:
-        read_master(path, key)
-    except MasterError:
+        read_linear(path, key)
+    except LinearImageError:
         return False
     return True
 

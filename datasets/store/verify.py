@@ -12,7 +12,7 @@ from datasets.plan import shard_count
 from datasets.schema import TABLES
 from datasets.store.dataset import DIGEST_KEY, Dataset, stage_of
 from datasets.store.digest import table_digest
-from datasets.store.linear_images import MasterError, masters, read_master
+from datasets.store.linear_images import LinearImageError, masters, read_linear
 
 
 def verify(dataset: Dataset) -> tuple[str, list[str]]:
@@ -57,7 +57,7 @@ def _masters(dataset: Dataset) -> list[str]:
     problems: list[str] = []
     for path, key in masters(dataset.root, dataset.recipe):
         try:
-            read_master(path, key)
-        except MasterError as error:
+            read_linear(path, key)
+        except LinearImageError as error:
             problems.append(str(error))
     return problems

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from datasets.trajectories.view import View
+from datasets.trajectories.view import PosedFrame
 from eposit import Pose
 from eposit.arrays import Array
 from eposit.pose import rotation_error_vector, rotation_from_euler
@@ -65,12 +65,12 @@ class Helix:
         carried = np.array([self.radius_mm * np.cos(angle), self.radius_mm * np.sin(angle), depth])
         return Pose(R, carried - R @ self._point_in_obj(target))
 
-    def view(self, time_s: float, target: Target) -> View:
+    def view(self, time_s: float, target: Target) -> PosedFrame:
         """Pose and rate at a time, the rate by a central difference."""
         before, after = (self.cam_from_obj(time_s + s * HALF_STEP_S, target) for s in (-1.0, 1.0))
         turn = rotation_error_vector(after.R, before.R)
         rate = Rate((after.t - before.t) / (2.0 * HALF_STEP_S), turn / (2.0 * HALF_STEP_S))
-        return View(time_s, self.cam_from_obj(time_s, target), rate)
+        return PosedFrame(time_s, self.cam_from_obj(time_s, target), rate)
 
     def _point_in_obj(self, target: Target) -> Array:
         if self.point == "board_centre":

@@ -17,7 +17,7 @@ TURN_MEANING = "rate at which the hand-held board turns about a random axis, deg
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class PosedFrame:
     """Where the target is and how it moves."""
 
     time_s: float  # on the trajectory; the pose's number where that has no time

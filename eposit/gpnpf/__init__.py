@@ -12,7 +12,7 @@ from eposit.camera import Camera
 from eposit.gpnpf.polynomials import SOLUTIONS, System, depth_ratios, squared_focal
 from eposit.pose import Pose
 from eposit.solution import Status
-from eposit.unknown_camera import CameraCandidates, Estimate, choose, in_chunks, misses, read, table
+from eposit.unknown_camera import CameraCandidates, Estimate, choose, in_chunks, read, reprojection_squares, table
 
 REAL_IMAGINARY = 1e-4  # |Im s| / |s| up to which a root counts as real: rounding parts a double root by about 1e-7
 START_IMAGINARY = 1.0  # the same for a start of the least squares of five and more points: every root
@@ -49,7 +49,7 @@ def solve(
     found = in_chunks(images, partial(_candidates, images.points_in_obj))
     with np.errstate(invalid="ignore"):
         in_front = np.all(found.poses.apply(images.points_in_obj)[..., 2] > 0.0, axis=-1)
-    cost = np.where(in_front, misses(images, found), np.nan)
+    cost = np.where(in_front, reprojection_squares(images, found), np.nan)
     found = CameraCandidates(found.poses, cost, found.f_px, found.k_per_px2, found.count)
     return choose(images, found, cost, STEPS, unusable)
 

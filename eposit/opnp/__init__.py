@@ -83,7 +83,7 @@ def solve(
     Returns:
         OpnpSolution. iterations are the Newton steps of the selected root, and Gauss-Newton's. Candidates are ordered
         by cost and padded with NaN to the longest list of a batch; poses with points behind the camera are in it.
-        Status FIELD_ANGLE: a point at or beyond 90 degrees; OUTSIDE_LENS; COPLANAR: the points lie on a line;
+        Status BEYOND_90_DEGREES: a point at or beyond 90 degrees; OUTSIDE_LENS; COPLANAR: the points lie on a line;
         NO_SOLUTION: no real root has all points in front. A batch gives the same poses as single calls to 1e-12.
     Raises:
         ValueError: wrong shapes, fewer than four points, non-finite object points, or an unusable sigma.
@@ -131,8 +131,8 @@ def _finished(problem: Problem, found: Refined, status: NDArray[np.int8]) -> Sol
     """Poses, RMSE and covariances at the poses, as `eposit.solve` states them; NaN where the status is not OK."""
     ok, n = status == OK, len(problem.points_in_obj)
     R, t = np.where(ok[:, None, None], found.R, np.nan), np.where(ok[:, None], found.t, np.nan)
-    misses = problem.camera.project(Pose(R, t).apply(problem.points_in_obj)) - problem.points_px
-    rmse = np.sqrt(np.sum(misses**2, axis=(1, 2)) / n)
+    residuals = problem.camera.project(Pose(R, t).apply(problem.points_in_obj)) - problem.points_px
+    rmse = np.sqrt(np.sum(residuals**2, axis=(1, 2)) / n)
     spread = np.full((len(ok), 6, 6), np.nan)
     if np.any(ok):
         u, v = problem.uv
@@ -149,7 +149,7 @@ def _checked(problem: Problem) -> tuple[NDArray[np.int8], Array, Array]:
     status = problem.status.copy()
     bearings = problem.camera.bearing(problem.points_px)
     mark(status, np.any(np.isnan(bearings), axis=(1, 2)), Status.OUTSIDE_LENS)
-    mark(status, np.any(bearings[..., 2] <= 0.0, axis=1), Status.FIELD_ANGLE)
+    mark(status, np.any(bearings[..., 2] <= 0.0, axis=1), Status.BEYOND_90_DEGREES)
     _, _, spreads = plane_axes(problem.points_in_obj)
     mark(status, np.full(len(status), bool(spreads[1] <= spreads[0] / COPLANAR_CONDITION)), Status.COPLANAR)
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -13,7 +13,7 @@ from eposit.pnpfr.polynomials import SOLUTIONS, Complex, dual_basis, solve_roots
 from eposit.pose import Pose, rotation_from_vector
 from eposit.shape import Shape
 from eposit.solution import Status
-from eposit.unknown_camera import CameraCandidates, Estimate, choose, in_chunks, misses, read, table
+from eposit.unknown_camera import CameraCandidates, Estimate, choose, in_chunks, read, reprojection_squares, table
 
 REAL_IMAGINARY = 1e-4  # largest imaginary part of the relative depths and of k up to which a root counts as real
 STEPS = 6  # of Newton's method; it needs 2 to 4
@@ -53,7 +53,7 @@ def solve(
         found = in_chunks(images, _nothing)
         return choose(images, found, found.cost, 0, Status.COPLANAR)
     found = in_chunks(images, partial(_candidates, images.points_in_obj))
-    cost = misses(images, found)
+    cost = reprojection_squares(images, found)
     with np.errstate(invalid="ignore"):
         cost = np.where(cost < REPRODUCED_PX2, cost, np.nan)
     found = CameraCandidates(found.poses, cost, found.f_px, found.k_per_px2, found.count)

@@ -12,31 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eposit.arrays import Array, Mask, pick
+from eposit.arrays import Array, Mask, take_last
+from eposit.pose import PoseBatch
 from eposit.posit.newton import CONTRACTS, STEPS, fixed_points
 from eposit.posit.orthography import Orthography, third_axis
 
 COMPRESS = 4  # finished problems leave the arrays when they are one in so many: leaving costs, and so does staying
 NEWTON_TOL = 1e-6  # tolerance from which Newton steps pay
-
-
-@dataclass(frozen=True, slots=True)
-class Start:
-    """Poses from a start or a search; rows that failed may be NaN."""
-
-    R: Array  # (3, 3, b)
-    t: Array  # (3, b), unit of the object points
-    iterations: NDArray[np.int64]  # (b,)
-    converged: Mask  # (b,)
-
-    def put(self, rows: NDArray[np.int64], other: Start) -> None:
-        """Overwrite some rows with those of another result; iterations add up."""
-        self.R[..., rows], self.t[:, rows], self.converged[rows] = other.R, other.t, other.converged
-        self.iterations[rows] += other.iterations
-
-    def take(self, rows: NDArray[np.int64]) -> Start:
-        """Some of the rows."""
-        return Start(pick(self.R, rows), pick(self.t, rows), self.iterations[rows], self.converged[rows])
 
 
 @dataclass(slots=True)
@@ -50,7 +32,7 @@ class _Found:
     def put(self, rows: NDArray[np.int64], axes: Array, good: Mask, count: NDArray[np.int64] | int) -> None:
         """Write some rows; those that are good have converged."""
         some = np.flatnonzero(good)
-        self.axes[..., rows[some]], self.converged[rows[some]] = pick(axes, some), True
+        self.axes[..., rows[some]], self.converged[rows[some]] = take_last(axes, some), True
         self.iterations[rows] = count
 
 
@@ -67,11 +49,11 @@ class _Work:
     def keep(self, kept: NDArray[np.int64]) -> None:
         """Drop the others."""
         self.rows, self.system = self.rows[kept], self.system.take(kept)
-        self.axes, self.change = pick(self.axes, kept), pick(self.change, kept)
-        self.k = None if self.k is None else pick(self.k, kept)
+        self.axes, self.change = take_last(self.axes, kept), take_last(self.change, kept)
+        self.k = None if self.k is None else take_last(self.k, kept)
 
 
-def posit(system: Orthography, tol: float, max_iterations: int, k: Array | None = None, step: float = 1.0) -> Start:
+def posit(system: Orthography, tol: float, max_iterations: int, k: Array | None = None, step: float = 1.0) -> PoseBatch:
     """The fixed points of POSIT's iteration.
 
     tol: stop when I and J change by less than this, relative to their length, or would in the next step if that
@@ -87,19 +69,19 @@ def posit(system: Orthography, tol: float, max_iterations: int, k: Array | None 
         rows = np.flatnonzero(system.contraction <= CONTRACTS) if newton else np.zeros(0, np.int64)
         solved = fixed_points(system if len(rows) == b else system.take(rows), tol) if len(rows) else None
         if solved is not None and len(rows) == b and np.all(solved[1]):
-            return Start(*system.pose(solved[0]), solved[2], solved[1])
+            return PoseBatch(*system.pose(solved[0]), solved[2], solved[1])
         found = _Found(np.full((2, 3, b), np.nan), np.zeros(b, np.int64), np.zeros(b, bool))
         if solved is not None:
             found.put(rows, *solved)
         _iterate(system, tol, max_iterations, k, step, found)
-        return Start(*system.pose(found.axes), found.iterations, found.converged)
+        return PoseBatch(*system.pose(found.axes), found.iterations, found.converged)
 
 
 def _iterate(system: Orthography, tol: float, max_iterations: int, k: Array | None, step: float, found: _Found) -> None:
     """The plain iteration on the rows that have not converged yet."""
     rows = np.flatnonzero(~found.converged & np.isfinite(system.contraction))
     if len(rows) < len(found.converged):
-        system, k = system.take(rows), None if k is None else pick(k, rows)
+        system, k = system.take(rows), None if k is None else take_last(k, rows)
     work = _Work(rows, system, k, np.zeros((2, 3, len(rows))), np.zeros(len(rows)))
     active = np.ones(len(rows), bool)
     for count in range(1, max_iterations + 1):

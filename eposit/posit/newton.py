@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from eposit.arrays import Array, Mask, cross, pick
+from eposit.arrays import Array, Mask, cross, take_last
 from eposit.posit.orthography import Orthography, third_axis
 
 CONTRACTS = 0.5  # largest contraction with which it is used: far from 1, as noise keeps I and J from right angles
@@ -28,7 +28,7 @@ def fixed_points(system: Orthography, tol: float) -> tuple[Array, Mask, NDArray[
     iterations = np.full(b, STEPS)
     settled, rows, part, before = np.zeros(b, bool), np.arange(b), system, np.zeros(b)
     for count in range(STEPS - DOUBLE_STEPS + 1, STEPS + 1):
-        some = k if len(rows) == b else pick(k, rows)
+        some = k if len(rows) == b else take_last(k, rows)
         scale, target = third_axis(part.axes(some))
         step = np.einsum("ijb,jb->ib", gain, target - some)
         some += step
@@ -44,7 +44,7 @@ def fixed_points(system: Orthography, tol: float) -> tuple[Array, Mask, NDArray[
             break
         if len(done):  # the others go on alone: no problem's result depends on which others are in the batch
             left = np.flatnonzero(~good)
-            rows, part, gain, before = rows[left], part.take(left), pick(gain, left), pick(before, left)
+            rows, part, gain, before = rows[left], part.take(left), take_last(gain, left), take_last(before, left)
     return system.axes(k), settled, iterations
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from eposit.arrays import Array, cross, pick
+from eposit.arrays import Array, cross, take_last
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class Orthography:
 
     def take(self, rows: NDArray[np.int64]) -> Orthography:
         """Some of the problems."""
-        parts = (pick(values, rows) for values in (self.first_seen, self.rest, self.pull, self.contraction))
+        parts = (take_last(values, rows) for values in (self.first_seen, self.rest, self.pull, self.contraction))
         return Orthography(self.reach, self.first_in_obj, *parts)
 
     def astype(self, dtype: DTypeLike) -> Orthography:

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eposit.arrays import Array, Mask, pick
-from eposit.posit.iteration import Start
+from eposit.arrays import Array, Mask, take_last
+from eposit.pose import PoseBatch
 from eposit.refine.ldl6 import LEAST_PIVOT, factorise, inverse, solve
-from eposit.refine.reprojection import Equations, View, cost, equations, gradient, residuals
+from eposit.refine.reprojection import Equations, Observations, cost, equations, gradient, residuals
 
 STEP_TOL = 1e-11  # rad and relative translation; the floor of double precision is about 1e-13
 COST_FLOOR = 1e-12  # relative growth of the cost that counts as rounding, not as a worse step
@@ -29,18 +29,18 @@ FRESH = 1e-3  # step up to which the matrix serves as that of the minimum: covar
 
 
 @dataclass(frozen=True, slots=True)
-class Minima:
+class RefinedPoses:
     """Poses of least cost near their starts."""
 
-    poses: Start
+    poses: PoseBatch
     cost: Array  # (b,) sums of squared residuals, infinite where a point cannot be projected
     spread: Array  # (6, 6, b) inverse information matrices: the covariance for residuals of variance 1
 
-    def take(self, rows: NDArray[np.int64]) -> Minima:
+    def take(self, rows: NDArray[np.int64]) -> RefinedPoses:
         """Some of the rows."""
-        return Minima(self.poses.take(rows), self.cost[rows], pick(self.spread, rows))
+        return RefinedPoses(self.poses.take(rows), self.cost[rows], take_last(self.spread, rows))
 
-    def replace(self, rows: NDArray[np.int64], other: Minima) -> None:
+    def replace(self, rows: NDArray[np.int64], other: RefinedPoses) -> None:
         """Overwrite some rows with those of another result."""
         poses, new = self.poses, other.poses
         poses.R[..., rows], poses.t[:, rows] = new.R, new.t
@@ -48,7 +48,7 @@ class Minima:
         self.cost[rows], self.spread[..., rows] = other.cost, other.spread
 
 
-def descend(view: View, start: Start) -> Minima:
+def descend(view: Observations, start: PoseBatch) -> RefinedPoses:
     """Local minima. Rows with NaN do not converge and have an infinite cost."""
     with np.errstate(all="ignore"):
         near, model = _damped(view, start.R, start.t, equations(view, start.R, start.t), NEAR)
@@ -58,18 +58,18 @@ def descend(view: View, start: Start) -> Minima:
         found, first = _with_one_matrix(view, near, spread, model.gradient, alive)
         left = np.flatnonzero(~found.converged & np.isfinite(model.cost))
         if len(left):
-            some = view.take(left), pick(near.R, left), pick(near.t, left), _part(model, left)
+            some = view.take(left), take_last(near.R, left), take_last(near.t, left), _part(model, left)
             found.put(left, _damped(*some, STEP_TOL)[0])
         stale = np.flatnonzero(found.converged & ~(first <= FRESH))
         if len(stale):
-            here = equations(view.take(stale), pick(found.R, stale), pick(found.t, stale))
+            here = equations(view.take(stale), take_last(found.R, stale), take_last(found.t, stale))
             spread[..., stale] = inverse(factorise(here.normal))
-        found = Start(found.R, found.t, found.iterations + start.iterations, found.converged)
-        return Minima(found, cost(residuals(view, found.R, found.t)), spread)
+        found = PoseBatch(found.R, found.t, found.iterations + start.iterations, found.converged)
+        return RefinedPoses(found, cost(residuals(view, found.R, found.t)), spread)
 
 
 def _damped(
-    view: View,
+    view: Observations,
     turn: Array,
     t: Array,
     model: Equations,
@@ -77,7 +77,7 @@ def _damped(
     damping: Array | float = 1e-6,
     before: Array | None = None,
     steps: int = MAX_STEPS,
-) -> tuple[Start, Equations]:
+) -> tuple[PoseBatch, Equations]:
     """At most so many steps of Levenberg and Marquardt until one is below `tol`; the equations at the poses reached."""
     b = t.shape[1]
     alive = np.isfinite(model.cost)
@@ -108,24 +108,24 @@ def _damped(
             break
         damping = np.where(better, damping * 0.1, np.maximum(damping, 1e-7) * 10.0)
         if len(rows) <= b // 2 and step < steps:
-            parts = view.take(rows), pick(turn, rows), pick(t, rows), _part(model, rows)
+            parts = view.take(rows), take_last(turn, rows), take_last(t, rows), _part(model, rows)
             rest, rest_model = _damped(*parts, tol, damping[rows], size[rows], steps - step)
-            found = Start(turn.copy(), t.copy(), counts, done)
+            found = PoseBatch(turn.copy(), t.copy(), counts, done)
             found.put(rows, rest)
             return found, _put(model, rows, rest_model)
         before = size
-    return Start(turn, t, counts, done), model
+    return PoseBatch(turn, t, counts, done), model
 
 
 def _with_one_matrix(
-    view: View,
-    near: Start,
+    view: Observations,
+    near: PoseBatch,
     spread: Array,
     slope: Array,
     alive: Mask,
     before: Array | None = None,
     steps: int = NEAR_STEPS,
-) -> tuple[Start, Array]:
+) -> tuple[PoseBatch, Array]:
     """At most so many steps with the given inverse matrix until they vanish, for the rows that are `alive`.
 
     Also the sizes of the first steps, (b,).
@@ -145,14 +145,17 @@ def _with_one_matrix(
         if not len(rows):
             break
         if len(rows) <= b // 2 and step < steps:
-            part, start = view.take(rows), Start(pick(turn, rows), pick(t, rows), np.zeros(len(rows), np.int64), alive)
+            part, start = (
+                view.take(rows),
+                PoseBatch(take_last(turn, rows), take_last(t, rows), np.zeros(len(rows), np.int64), alive),
+            )
             slope, alive = gradient(part, start.R, start.t), np.ones(len(rows), bool)
-            rest, _ = _with_one_matrix(part, start, pick(spread, rows), slope, alive, size[rows], steps - step)
-            found = Start(turn.copy(), t.copy(), counts, done)
+            rest, _ = _with_one_matrix(part, start, take_last(spread, rows), slope, alive, size[rows], steps - step)
+            found = PoseBatch(turn.copy(), t.copy(), counts, done)
             found.put(rows, rest)
             return found, first
         slope, before = gradient(view, turn, t), size
-    return Start(turn, t, counts, done), first
+    return PoseBatch(turn, t, counts, done), first
 
 
 def _moved(R: Array, t: Array, move: Array) -> tuple[Array, Array]:
@@ -183,7 +186,7 @@ def _either(first: Mask, a: Equations, b: Equations) -> Equations:
 
 
 def _part(model: Equations, rows: NDArray[np.int64]) -> Equations:
-    return Equations(model.cost[rows], pick(model.gradient, rows), pick(model.normal, rows))
+    return Equations(model.cost[rows], take_last(model.gradient, rows), take_last(model.normal, rows))
 
 
 def _put(model: Equations, rows: NDArray[np.int64], part: Equations) -> Equations:

@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from eposit.arrays import Array, pick
+from eposit.arrays import Array, take_last
 from eposit.camera import Camera
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class Observations:
     """b images of the same n points, with their weights."""
 
     camera: Camera
@@ -27,7 +27,7 @@ class View:
     diagonal: Array | None  # (n, 2, 1), the factor's diagonal where it has nothing else
 
     @staticmethod
-    def of(camera: Camera, points_in_obj: Array, points_px: Array, weights: Array) -> View:
+    def of(camera: Camera, points_in_obj: Array, points_px: Array, weights: Array) -> Observations:
         """From (b, n, 2) px and (2, 2, n) whitening."""
         seen = np.array(points_px.transpose(1, 2, 0), order="C")
         seen -= np.array([[camera.cx], [camera.cy]])
@@ -35,11 +35,11 @@ class View:
         factor = weights.transpose(2, 0, 1) * np.array([camera.fx, camera.fy])
         crossed = np.any(factor[:, 0, 1]) or np.any(factor[:, 1, 0])
         diagonal = None if crossed else np.ascontiguousarray(factor[:, [0, 1], [0, 1]])[..., None]
-        return View(camera, points_in_obj, seen, factor, diagonal)
+        return Observations(camera, points_in_obj, seen, factor, diagonal)
 
-    def take(self, rows: NDArray[np.int64]) -> View:
+    def take(self, rows: NDArray[np.int64]) -> Observations:
         """Some of the images."""
-        return replace(self, seen=pick(self.seen, rows))
+        return replace(self, seen=take_last(self.seen, rows))
 
     def whiten(self, values: Array) -> Array:
         """Whitened px of (n, 2, b) values."""
@@ -61,7 +61,7 @@ class Equations:
     normal: Array  # (6, 6, b) J^T J, upper triangle
 
 
-def residuals(view: View, R: Array, t: Array) -> Array:
+def residuals(view: Observations, R: Array, t: Array) -> Array:
     """(n, 2, b) whitened residuals, projection minus observation; not finite where a point cannot be projected."""
     point = np.einsum("nj,ijb->nib", view.points_in_obj, R)
     point += t
@@ -75,7 +75,7 @@ def cost(residual: Array) -> Array:
     return np.where(np.isfinite(total), total, np.inf)
 
 
-def gradient(view: View, R: Array, t: Array) -> Array:
+def gradient(view: Observations, R: Array, t: Array) -> Array:
     """(6, b) J^T r, without forming J."""
     arm = np.einsum("nj,ijb->nib", view.points_in_obj, R)
     point = arm + t
@@ -95,7 +95,7 @@ def gradient(view: View, R: Array, t: Array) -> Array:
     return result
 
 
-def equations(view: View, R: Array, t: Array) -> Equations:
+def equations(view: Observations, R: Array, t: Array) -> Equations:
     """Cost, gradient and information matrix."""
     arm = np.einsum("nj,ijb->nib", view.points_in_obj, R)
     n, _, b = arm.shape
@@ -116,7 +116,7 @@ def equations(view: View, R: Array, t: Array) -> Equations:
     return Equations(cost(residual), np.einsum("kb,kib->ib", residual.reshape(2 * n, b), rows), normal)
 
 
-def _fill_slopes(view: View, out: Array, side: Array, scale: Array, forward: Array, bend: Array | None) -> None:
+def _fill_slopes(view: Observations, out: Array, side: Array, scale: Array, forward: Array, bend: Array | None) -> None:
     """Whitened derivatives of the projections by the camera coordinates, (n, 2, 3, b)."""
     if view.diagonal is None:
         plain = np.empty_like(out)

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from eposit.arrays import Array, Mask
 from eposit.camera import Camera
-from eposit.posit.iteration import Start
+from eposit.pose import PoseBatch
 from eposit.refine import ldl6
 from eposit.refine.minimise import descend
-from eposit.refine.reprojection import View, equations
+from eposit.refine.reprojection import Observations, equations
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,9 +61,9 @@ def refine_poses(
 
     points_in_obj: (n, 3). u, v: (n, b) px. R, t: (b, 3, 3), (b, 3); NaN rows stay NaN. weights: (2, 2, n).
     """
-    view = View.of(camera, points_in_obj, np.stack((u.T, v.T), axis=-1), weights)
+    view = Observations.of(camera, points_in_obj, np.stack((u.T, v.T), axis=-1), weights)
     b = len(t)
-    found = descend(view, Start(*_columns(R, t), np.zeros(b, np.int64), np.ones(b, bool)))
+    found = descend(view, PoseBatch(*_columns(R, t), np.zeros(b, np.int64), np.ones(b, bool)))
     poses = found.poses
     return Refined(poses.R.transpose(2, 0, 1), poses.t.T, found.cost, poses.iterations, poses.converged)
 
@@ -72,7 +72,7 @@ def normal_equations(
     camera: Camera, points_in_obj: Array, u: Array, v: Array, R: Array, t: Array, weights: Array
 ) -> tuple[Array, Array]:
     """(b, 6, 6) information matrix J^T J and (b, 6) gradient J^T r of the weighted residuals."""
-    view = View.of(camera, points_in_obj, np.stack((u.T, v.T), axis=-1), weights)
+    view = Observations.of(camera, points_in_obj, np.stack((u.T, v.T), axis=-1), weights)
     with np.errstate(all="ignore"):
         model = equations(view, *_columns(R, t))
     normal = model.normal.transpose(2, 0, 1).copy()

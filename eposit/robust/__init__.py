@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from eposit.arrays import Array, Mask
 from eposit.camera import Camera
 from eposit.pose import Pose
-from eposit.robust.ray_residuals import View, distances, fit, squares, view_of
+from eposit.robust.ray_residuals import RayObservations, distances, fit, ray_observations, squares
 from eposit.robust.triangle_design import spread_triangles
 from eposit.solution import Solution, join
 from eposit.starts.p3p import p3p_poses
@@ -50,7 +50,10 @@ def find_inliers(points_in_obj: Array, points_px: Array, camera: Camera, weights
             f"robust=True was given {n} points; it takes {LEAST_POINTS} or more, so that with two exchanged three of "
             "the others give a pose and three confirm it: give more points or leave robust out"
         )
-    view, inliers = view_of(points_in_obj, points_px, camera, weights, known), np.ones(points_px.shape[:2], bool)
+    view, inliers = (
+        ray_observations(points_in_obj, points_px, camera, weights, known),
+        np.ones(points_px.shape[:2], bool),
+    )
     triangles, size = spread_triangles(points_in_obj, TRIANGLES), max(1, CHUNK_POINTS // n)
     for i in range(0, len(points_px) if triangles else 0, size):
         rows = slice(i, i + size)
@@ -91,8 +94,8 @@ def _in_order(solution: Solution, rows: NDArray[np.int64]) -> Solution:
     )
 
 
-def _trimmed(view: View, triangles: list[list[int]]) -> tuple[tuple[Array, Array], Mask]:
-    """Pose and points of the least trimmed squares: the lowest sum of the `least` smallest squared misses."""
+def _trimmed(view: RayObservations, triangles: list[list[int]]) -> tuple[tuple[Array, Array], Mask]:
+    """Pose and points of the least trimmed squares: the lowest sum of the `least` smallest squared residuals."""
     poses = _starts(view, triangles)
     for _ in range(STEPS):
         poses = fit(view, _nearest(squares(view, *poses), view.least), poses)
@@ -101,7 +104,7 @@ def _trimmed(view: View, triangles: list[list[int]]) -> tuple[tuple[Array, Array
     return pose, _nearest(squares(view, *pose), view.least)
 
 
-def _starts(view: View, triangles: list[list[int]]) -> tuple[Array, Array]:
+def _starts(view: RayObservations, triangles: list[list[int]]) -> tuple[Array, Array]:
     """The KEPT poses of triangles with the lowest trimmed sums."""
     rays = view.rays.transpose(1, 2, 0)
     poses = [pose for three in triangles for pose in p3p_poses(view.points_in_obj[three], rays[three], 4)]
@@ -110,7 +113,7 @@ def _starts(view: View, triangles: list[list[int]]) -> tuple[Array, Array]:
     )
 
 
-def _cheapest(view: View, poses: tuple[Array, Array], count: int) -> tuple[Array, Array]:
+def _cheapest(view: RayObservations, poses: tuple[Array, Array], count: int) -> tuple[Array, Array]:
     """Of (k, b, 3, 3) and (k, b, 3) the `count` of lowest trimmed sums for each image, lowest first."""
     smallest = np.partition(squares(view, *poses), view.least - 1, axis=-1)[..., : view.least]
     order = np.argsort(np.sum(smallest, axis=-1), axis=0, kind="stable")[:count]
@@ -118,11 +121,11 @@ def _cheapest(view: View, poses: tuple[Array, Array], count: int) -> tuple[Array
     return poses[0][order, images], poses[1][order, images]
 
 
-def _search(view: View, pose: tuple[Array, Array], chosen: Mask) -> Mask:
+def _search(view: RayObservations, pose: tuple[Array, Array], chosen: Mask) -> Mask:
     """Add the nearest point, one at a time; the points before the first that a test refuses are the answer.
 
-    The test: the squared miss of the nearest point outside, over its variance given the pose of those inside, has an
-    F distribution with 2 and the pose's degrees of freedom, whose tail is (1 + 2 x / f)^(-f / 2).
+    The test: the squared residual of the nearest point outside, over its variance given the pose of those inside,
+    has an F distribution with 2 and the pose's degrees of freedom, whose tail is (1 + 2 x / f)^(-f / 2).
     """
     n = view.rays.shape[1]
     answer, open_ = np.ones_like(chosen), np.ones(len(chosen), bool)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from eposit import Camera, Solution
 from eposit.arrays import Array
-from pipelines.adapters.results import Answer, Failure, found, rectified, solve_each
+from pipelines.adapters.results import Failure, PoseResult, pose_result, rectified, solve_each
 
 DIRECT_LINEAR_POINTS = 6  # what ITERATIVE needs to begin with, unless the points lie in one plane
 FISHEYE_LENSES = ("equidistance", "kannala_brandt")
@@ -50,13 +50,13 @@ def fisheye(
 ) -> Solution:
     """`cv2.fisheye.solvePnP`, whose lens is Kannala-Brandt's, or equidistance where its coefficients are 0.
 
-    Other lenses have the status lens_not_taken, 4 or 5 points that are not in a plane too_few_points.
+    Other lenses have the status unsupported_lens, 4 or 5 points that are not in a plane too_few_points.
     """
     matrix, coefficients = camera.matrix(), np.array(camera.coefficients or (0.0,) * 4)
 
-    def solve_one(obj: Array, image: Array) -> Answer:
+    def solve_one(obj: Array, image: Array) -> PoseResult:
         if camera.lens not in FISHEYE_LENSES:
-            return Answer(Failure.LENS_NOT_TAKEN)
+            return PoseResult(Failure.UNSUPPORTED_LENS)
         try:
             done, rotation, t = cv2.fisheye.solvePnP(obj, image[:, None], matrix, coefficients)
         except cv2.error:
@@ -74,7 +74,7 @@ def _forward(points_px: Array, camera: Camera) -> tuple[Array, NDArray[np.str_]]
 def _solve_pnp(points_in_obj: ArrayLike, points_px: ArrayLike, camera: Camera, flag: int) -> Solution:
     matrix = camera.matrix()
 
-    def solve_one(obj: Array, image: Array) -> Answer:
+    def solve_one(obj: Array, image: Array) -> PoseResult:
         try:
             done, rotation, t = cv2.solvePnP(obj, np.ascontiguousarray(image), matrix, None, flags=flag)
         except cv2.error:
@@ -84,9 +84,9 @@ def _solve_pnp(points_in_obj: ArrayLike, points_px: ArrayLike, camera: Camera, f
     return solve_each(points_in_obj, points_px, camera, solve_one)
 
 
-def _refused(obj: Array) -> Answer:
-    return Answer(Failure.TOO_FEW_POINTS if len(obj) < DIRECT_LINEAR_POINTS else Failure.NO_SOLUTION)
+def _refused(obj: Array) -> PoseResult:
+    return PoseResult(Failure.TOO_FEW_POINTS if len(obj) < DIRECT_LINEAR_POINTS else Failure.NO_SOLUTION)
 
 
-def _answer(done: bool, rotation: ArrayLike, t: ArrayLike) -> Answer:
-    return found(cv2.Rodrigues(np.asarray(rotation))[0], t) if done else Answer(Failure.NO_SOLUTION)
+def _answer(done: bool, rotation: ArrayLike, t: ArrayLike) -> PoseResult:
+    return pose_result(cv2.Rodrigues(np.asarray(rotation))[0], t) if done else PoseResult(Failure.NO_SOLUTION)

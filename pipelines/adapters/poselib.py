@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from eposit import Camera, Solution
 from eposit.arrays import Array
-from pipelines.adapters.results import Answer, Failure, found, rays, solve_each
+from pipelines.adapters.results import Failure, PoseResult, pose_result, rays, solve_each
 
 
 def p3p(
@@ -16,13 +16,13 @@ def p3p(
 ) -> Solution:
     """`poselib.p3p` on the first three rays, of any lens; the fourth point decides. Shapes as `eposit.solve`."""
 
-    def solve_one(obj: Array, bearings: Array) -> Answer:
-        best, least = Answer(Failure.NO_SOLUTION), np.inf
+    def solve_one(obj: Array, bearings: Array) -> PoseResult:
+        best, least = PoseResult(Failure.NO_SOLUTION), np.inf
         for pose in poselib.p3p(bearings[:3], obj[:3]):
             last = pose.R @ obj[3] + pose.t
             miss = float(np.linalg.norm(last / np.linalg.norm(last) - bearings[3]))
             if miss < least:
-                best, least = found(pose.R, pose.t), miss
+                best, least = pose_result(pose.R, pose.t), miss
         return best
 
     return solve_each(points_in_obj, points_px, camera, solve_one, rays)
@@ -39,20 +39,20 @@ def p4pf(
     """
     matrix = camera.matrix()
 
-    def solve_one(obj: Array, image: Array) -> Answer:
+    def solve_one(obj: Array, image: Array) -> PoseResult:
         plane = (image - matrix[:2, 2]) / matrix[[0, 1], [0, 1]]
         # The solver loses its digits, and one solution in three, on numbers far from 1.
         moved = obj - obj[0]
         size = np.abs(moved).max()
         plane, small = plane / np.abs(plane).max(), moved / size
-        best, least = Answer(Failure.NO_SOLUTION), np.inf
+        best, least = PoseResult(Failure.NO_SOLUTION), np.inf
         for pose, focal in zip(*poselib.p4pf(plane, small, False), strict=True):
             in_cam = small @ pose.R.T + pose.t
             if not (focal > 0.0 and np.all(in_cam[:, 2] > 0.0)):
                 continue
             miss = float(np.sum((focal * in_cam[:, :2] / in_cam[:, 2:] - plane) ** 2))
             if miss < least:
-                best, least = found(pose.R, pose.t * size - pose.R @ obj[0]), miss
+                best, least = pose_result(pose.R, pose.t * size - pose.R @ obj[0]), miss
         return best
 
     return solve_each(points_in_obj, points_px, camera, solve_one)

@@ -19,7 +19,7 @@ class Failure(StrEnum):
 
     NO_SOLUTION = "no_solution"  # the solver found none
     TOO_FEW_POINTS = "too_few_points"  # the solver takes more points than there are
-    LENS_NOT_TAKEN = "lens_not_taken"  # the solver has no equations for this lens
+    UNSUPPORTED_LENS = "unsupported_lens"  # the solver has no equations for this lens
     SOLVER_ERROR = "solver_error"  # a user's function raised an exception or gave what is no pose
     MISSING = "missing"  # a file of poses has none for this frame
 
@@ -39,7 +39,7 @@ def _nan(*shape: int) -> Callable[[], Array]:
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class PoseResult:
     """The outcome of one image; every status but ok comes with NaN."""
 
     status: str
@@ -49,12 +49,12 @@ class Answer:
     covariance: Array = field(default_factory=_nan(6, 6))  # (6, 6) as in `Solution`, NaN: none stated
 
 
-def found(R: ArrayLike, t: ArrayLike) -> Answer:
+def pose_result(R: ArrayLike, t: ArrayLike) -> PoseResult:
     """A pose as an answer; one that is not finite is none. t: (3,) or (3, 1)."""
     rotation, position = np.asarray(R, dtype=np.float64), np.asarray(t, dtype=np.float64).reshape(3)
     if not (np.all(np.isfinite(rotation)) and np.all(np.isfinite(position))):
-        return Answer(Failure.NO_SOLUTION)
-    return Answer(Status.OK, rotation, position)
+        return PoseResult(Failure.NO_SOLUTION)
+    return PoseResult(Status.OK, rotation, position)
 
 
 def checked(points_in_obj: ArrayLike, points_px: ArrayLike) -> tuple[Array, Array, bool]:
@@ -84,10 +84,10 @@ def rays(points_px: Array, camera: Camera) -> tuple[Array, NDArray[np.str_]]:
 def rectified(points_px: Array, camera: Camera) -> tuple[Array, NDArray[np.str_]]:
     """(b, n, 2) px of any lens to those of a pinhole with the same matrix, and (b,) statuses as of `rays`.
 
-    At and beyond 90 degrees a pinhole has no image: such an image has the status field_angle.
+    At and beyond 90 degrees a pinhole has no image: such an image has the status beyond_90_degrees.
     """
     bearings, status = rays(points_px, camera)
-    status[(status == Status.OK) & np.any(bearings[..., 2] <= 0.0, axis=1)] = Status.FIELD_ANGLE
+    status[(status == Status.OK) & np.any(bearings[..., 2] <= 0.0, axis=1)] = Status.BEYOND_90_DEGREES
     if camera.lens == "perspective":
         return points_px, status
     return camera.replace(lens="perspective", coefficients=()).project(bearings), status
@@ -97,7 +97,7 @@ def solve_each(
     points_in_obj: ArrayLike,
     points_px: ArrayLike,
     camera: Camera,
-    solve_one: Callable[[Array, Array], Answer],
+    solve_one: Callable[[Array, Array], PoseResult],
     seen: Callable[[Array, Camera], tuple[Array, NDArray[np.str_]]] = rectified,
 ) -> Solution:
     """Give a solver one image at a time.
@@ -107,13 +107,15 @@ def solve_each(
     obj, batch, single = checked(points_in_obj, points_px)
     images, statuses = seen(batch, camera)
     answers = [
-        solve_one(obj, image) if status == Status.OK else Answer(str(status))
+        solve_one(obj, image) if status == Status.OK else PoseResult(str(status))
         for image, status in zip(images, statuses, strict=True)
     ]
     return gather(obj, batch, camera, answers, single)
 
 
-def gather(points_in_obj: Array, points_px: Array, camera: Camera, answers: Sequence[Answer], single: bool) -> Solution:
+def gather(
+    points_in_obj: Array, points_px: Array, camera: Camera, answers: Sequence[PoseResult], single: bool
+) -> Solution:
     """Answers to (b, n, 2) px as one `Solution`; for a single image without the leading axis."""
     batch = stack(answers)
     ok, rmse, pose = batch.status == Status.OK, batch.reprojection_rmse_px, batch.cam_from_obj
@@ -127,7 +129,7 @@ def gather(points_in_obj: Array, points_px: Array, camera: Camera, answers: Sequ
     return Solution(str(batch.status[0]), Pose(pose.R[0], pose.t[0]), iterations, float(rmse[0]), covariance)
 
 
-def stack(answers: Sequence[Answer]) -> Solution:
+def stack(answers: Sequence[PoseResult]) -> Solution:
     """b answers as one batch, without reprojection errors (NaN)."""
     b = len(answers)
     R = np.array([answer.R for answer in answers]).reshape(b, 3, 3)

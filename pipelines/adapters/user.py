@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from datasets.errors import UserError
 from eposit import Camera, Solution, Status
 from eposit.arrays import Array
-from pipelines.adapters.results import Answer, Failure, Solver, checked, found, gather
+from pipelines.adapters.results import Failure, PoseResult, Solver, checked, gather, pose_result
 
 NAME = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*(\.[^\W\d]\w*)*")
 ROTATION_TOLERANCE = 1e-5  # of R^T R - 1; what was computed in single precision is off by some 1e-7
@@ -106,7 +106,7 @@ def check_call(function: Callable[..., Any], what: str, form: str, count: int, k
     raise UserError(f"{what} is {signature}; it must take {form}")
 
 
-def attempt(call: Callable[[], Any], what: str, tell: Callable[[str], None]) -> Answer:
+def attempt(call: Callable[[], Any], what: str, tell: Callable[[str], None]) -> PoseResult:
     """The answer of one call: an exception, or a pose that is none, is a status and a line for `tell`.
 
     Raises:
@@ -116,19 +116,19 @@ def attempt(call: Callable[[], Any], what: str, tell: Callable[[str], None]) -> 
         result = call()
     except (Exception, SystemExit) as error:
         tell(_line(error))
-        return Answer(Failure.SOLVER_ERROR)
+        return PoseResult(Failure.SOLVER_ERROR)
     answer = _read(result, what)
     fault = _fault(answer) if answer.status == Status.OK else None
     if fault:
         tell(fault)
-        return Answer(Failure.SOLVER_ERROR)
+        return PoseResult(Failure.SOLVER_ERROR)
     return answer
 
 
-def _read(result: Any, what: str) -> Answer:
+def _read(result: Any, what: str) -> PoseResult:
     """None, (R, t), (R, t, status), or an object with `status` and `cam_from_obj` or `R` and `t`."""
     if result is None:
-        return Answer(Failure.NO_SOLUTION)
+        return PoseResult(Failure.NO_SOLUTION)
     if isinstance(result, tuple | list):
         if len(result) not in (2, 3):
             raise UserError(f"{what} gave {len(result)} values; it must give R and t, or R, t and a status")
@@ -145,20 +145,20 @@ def _read(result: Any, what: str) -> Answer:
         return answer
     count = 0 if iterations is None else int(_numbers(iterations, (), f"{what} gave iterations"))
     spread = answer.covariance if covariance is None else _numbers(covariance, (6, 6), f"{what} gave a covariance")
-    return Answer(answer.status, answer.R, answer.t, count, spread)
+    return PoseResult(answer.status, answer.R, answer.t, count, spread)
 
 
-def _answer(R: Any, t: Any, status: Any, what: str) -> Answer:
+def _answer(R: Any, t: Any, status: Any, what: str) -> PoseResult:
     if not isinstance(status, str) or not status or (status != Status.OK and status.strip().lower() == Status.OK):
         raise UserError(f'{what} gave the status {status!r}; it must be a text, "ok" or the reason of a failure')
     if status != Status.OK:
-        return Answer(str(status))
+        return PoseResult(str(status))
     if R is None or t is None:
-        return Answer(Failure.NO_SOLUTION)
+        return PoseResult(Failure.NO_SOLUTION)
     position = np.asarray(t) if isinstance(t, np.ndarray) and t.shape in ((3, 1), (1, 3)) else t
     position = np.ravel(position) if isinstance(position, np.ndarray) else position
     rotation = _numbers(R, (3, 3), f"{what} gave R")
-    return Answer(Status.OK, rotation, _numbers(position, (3,), f"{what} gave t"))
+    return PoseResult(Status.OK, rotation, _numbers(position, (3,), f"{what} gave t"))
 
 
 def _numbers(value: Any, shape: tuple[int, ...], what: str) -> Array:
@@ -172,9 +172,9 @@ def _numbers(value: Any, shape: tuple[int, ...], what: str) -> Array:
     return array
 
 
-def _fault(answer: Answer) -> str | None:
+def _fault(answer: PoseResult) -> str | None:
     """What is wrong with a pose that is said to be one."""
-    if found(answer.R, answer.t).status != Status.OK:
+    if pose_result(answer.R, answer.t).status != Status.OK:
         return "a pose that is not finite, with the status ok"
     if np.abs(answer.R.T @ answer.R - np.eye(3)).max() > ROTATION_TOLERANCE or np.linalg.det(answer.R) < 0.0:
         return "an R that is no rotation, with the status ok"

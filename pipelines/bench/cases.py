@@ -13,9 +13,9 @@ from datasets.recipe.model import Recipe
 from eposit import Camera
 from pipelines.detection import detect_points
 from render.analytic.image_circle import lens_coverage
-from render.frame import Master, render_master
+from render.frame import LinearImage, render_frame
 from render.region import Image, Region
-from render.sensor.develop import Shot, develop
+from render.sensor.develop import FrameContext, develop
 
 
 def chosen_poses(recipe: Recipe, poses: int) -> list[int]:
@@ -32,9 +32,9 @@ def chosen_frames(recipe: Recipe, poses: int) -> dict[str, list[Frame]]:
     }
 
 
-def master_of(recipe: Recipe, frame: Frame, samples: int | None = None) -> Master:
+def linear_of(recipe: Recipe, frame: Frame, samples: int | None = None) -> LinearImage:
     """A frame's linear light, at the recipe's samples if none are given."""
-    return render_master(
+    return render_frame(
         recipe.target,
         recipe.light,
         frame.camera.true_camera(),
@@ -43,25 +43,27 @@ def master_of(recipe: Recipe, frame: Frame, samples: int | None = None) -> Maste
     )
 
 
-def image_of(recipe: Recipe, frame: Frame, master: Master | None = None) -> NDArray[np.uint8]:
+def image_of(recipe: Recipe, frame: Frame, linear: LinearImage | None = None) -> NDArray[np.uint8]:
     """The developed picture of a frame, of its own light if none is given."""
     camera = frame.camera.true_camera()
-    light = master_of(recipe, frame) if master is None else master
-    shot = Shot(recipe.target, camera, frame.cam_from_obj, frame.rate, light.region, frame.sensor_seed)
+    light = linear_of(recipe, frame) if linear is None else linear
+    shot = FrameContext(recipe.target, camera, frame.cam_from_obj, frame.rate, light.region, frame.sensor_seed)
     return develop(light.full(camera), frame.sensor, shot)
 
 
-def over_background(recipe: Recipe, camera: Camera, film: Image, region: Region) -> Master:
+def over_background(recipe: Recipe, camera: Camera, film: Image, region: Region) -> LinearImage:
     """The light of a region from another renderer's film, (height, width, 2): radiance and share of hits."""
     x, y, width, height = region
     behind = np.maximum(lens_coverage(camera)[y : y + height, x : x + width] - film[..., 1], 0.0)
-    return Master((film[..., 0] + recipe.light.background * behind).astype(np.float32), region, recipe.light.background)
+    return LinearImage(
+        (film[..., 0] + recipe.light.background * behind).astype(np.float32), region, recipe.light.background
+    )
 
 
-def corner_errors(recipe: Recipe, frame: Frame, master: Master) -> NDArray[np.float64]:
+def corner_errors(recipe: Recipe, frame: Frame, linear: LinearImage) -> NDArray[np.float64]:
     """(n, 2) errors, px, of the corners that our detection finds in the picture; NaN where it finds none."""
     target = recipe.target
-    found = detect_points(image_of(recipe, frame, master), target).points_px
+    found = detect_points(image_of(recipe, frame, linear), target).points_px
     truth = frame.camera.true_camera().project(frame.cam_from_obj.apply(target.points))
     return (found - truth)[: target.circle_index]
 

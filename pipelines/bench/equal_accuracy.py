@@ -7,11 +7,11 @@ from collections.abc import Iterator
 
 from datasets.plan import Frame
 from datasets.recipe.model import Recipe
-from pipelines.bench.cases import chosen_frames, corner_errors, master_of, over_background, rms
+from pipelines.bench.cases import chosen_frames, corner_errors, linear_of, over_background, rms
 from pipelines.bench.frame import frame_of_ours, plain
 from pipelines.bench.table import Row, compared, noted
 from pipelines.bench.timing import in_turn
-from render.frame import Master
+from render.frame import LinearImage
 from render.region import target_region
 
 PART = "equal error"
@@ -26,7 +26,7 @@ def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
     same pixels. Where 2048 samples do not suffice, they are timed: the ratio is then a lower bound.
     """
     frames = chosen_frames(recipe, POSES)[recipe.cameras[-1].name]
-    ours = rms([corner_errors(recipe, frame, master_of(recipe, frame)) for frame in frames])
+    ours = rms([corner_errors(recipe, frame, linear_of(recipe, frame)) for frame in frames])
     yield noted(PART, f"{frames[0].camera.name}: corners, ours", f"{ours:.4f} px RMS")
     needed = SAMPLES[-1]
     for samples in SAMPLES:
@@ -41,7 +41,7 @@ def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
     yield compared(PART, "frame and detection", own, f"full picture, Mitsuba direct, {needed} rays", that)
 
 
-def _plain_master(recipe: Recipe, frame: Frame, samples: int) -> Master:
+def _plain_master(recipe: Recipe, frame: Frame, samples: int) -> LinearImage:
     camera = frame.camera.true_camera()
     region = target_region(recipe.target, camera, frame.cam_from_obj)
     return over_background(recipe, camera, plain(recipe, frame, samples, region), region)

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from datasets.plan import Frame
 from datasets.recipe.model import Recipe
 from datasets.store.images import encode_png
-from datasets.store.linear_images import write_master
-from pipelines.bench.cases import chosen_frames, image_of, master_of
+from datasets.store.linear_images import write_linear
+from pipelines.bench.cases import chosen_frames, image_of, linear_of
 from pipelines.bench.table import Row, compared
 from pipelines.bench.timing import Times, in_turn, total
 from pipelines.detection import detect_points
@@ -61,9 +61,9 @@ def frame_of_ours(recipe: Recipe, frame: Frame) -> None:
     """Everything that a frame of a dataset costs, one after the other."""
     camera = frame.camera.true_camera()
     with tempfile.TemporaryDirectory() as folder:
-        master = master_of(recipe, frame)
-        write_master(master, camera, Path(folder) / "master.exr")
-        image = image_of(recipe, frame, master)
+        linear = linear_of(recipe, frame)
+        write_linear(linear, camera, Path(folder) / "linear.exr")
+        image = image_of(recipe, frame, linear)
         encode_png(image)
         detect_points(image, recipe.target)
 

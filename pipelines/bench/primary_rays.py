@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from datasets.plan import Frame
 from datasets.recipe.model import Recipe
-from pipelines.bench.cases import chosen_frames, master_of
+from pipelines.bench.cases import chosen_frames, linear_of
 from pipelines.bench.table import Row, compared
 from pipelines.bench.timing import Times, in_turn, total
 from render import backend
@@ -29,7 +29,7 @@ def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
     sums: list[list[Times]] = []
     for camera, frames in chosen_frames(recipe, poses).items():
         times = [
-            in_turn(functools.partial(master_of, recipe, frame), functools.partial(primary_rays, recipe, frame))
+            in_turn(functools.partial(linear_of, recipe, frame), functools.partial(primary_rays, recipe, frame))
             for frame in frames
         ]
         own, floor = (total(list(column)) for column in zip(*times, strict=True))

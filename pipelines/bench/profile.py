@@ -15,8 +15,8 @@ import eposit
 from datasets.plan import Frame
 from datasets.recipe.model import Recipe
 from datasets.store.images import decode_png, encode_png
-from datasets.store.linear_images import write_master
-from pipelines.bench.cases import chosen_frames, image_of, master_of
+from datasets.store.linear_images import write_linear
+from pipelines.bench.cases import chosen_frames, image_of, linear_of
 from pipelines.bench.primary_rays import NAME, primary_rays
 from pipelines.bench.table import Row, compared
 from pipelines.bench.timing import in_turn
@@ -41,16 +41,16 @@ def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
 
 def _steps(recipe: Recipe, frame: Frame, folder: Path) -> Iterator[tuple[str, Call, str, Call]]:
     camera, target = frame.camera.true_camera(), recipe.target
-    master = master_of(recipe, frame)
-    picture, image = master.full(camera), image_of(recipe, frame, master)
+    linear = linear_of(recipe, frame)
+    picture, image = linear.full(camera), image_of(recipe, frame, linear)
     data = encode_png(image)
     copied = functools.partial(np.copy, image)
-    raw = functools.partial((folder / "raw").write_bytes, master.radiance.tobytes())
-    exr = functools.partial(write_master, master, camera, folder / "master.exr")
-    yield "render", functools.partial(master_of, recipe, frame), NAME, functools.partial(primary_rays, recipe, frame)
-    yield "write the master as EXR", exr, "write its bytes", raw
+    raw = functools.partial((folder / "raw").write_bytes, linear.radiance.tobytes())
+    exr = functools.partial(write_linear, linear, camera, folder / "linear.exr")
+    yield "render", functools.partial(linear_of, recipe, frame), NAME, functools.partial(primary_rays, recipe, frame)
+    yield "write the linear image as EXR", exr, "write its bytes", raw
     blur = functools.partial(cv2.GaussianBlur, picture, (9, 9), 0.7)
-    yield "develop", functools.partial(image_of, recipe, frame, master), "one gaussian blur of the picture", blur
+    yield "develop", functools.partial(image_of, recipe, frame, linear), "one gaussian blur of the picture", blur
     yield "encode PNG", functools.partial(encode_png, image), "copy the picture", copied
     yield "decode PNG", functools.partial(decode_png, data), "copy the picture", copied
     yield from _detection(image, target)

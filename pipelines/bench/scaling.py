@@ -12,8 +12,8 @@ import numpy as np
 from datasets.plan import plan
 from datasets.recipe.model import Recipe
 from datasets.store.images import encode_png
-from datasets.store.linear_images import write_master
-from pipelines.bench.cases import chosen_poses, master_of, scaled
+from datasets.store.linear_images import write_linear
+from pipelines.bench.cases import chosen_poses, linear_of, scaled
 from pipelines.bench.end_to_end import by_pose, run_stages
 from pipelines.bench.table import Row, noted
 from pipelines.bench.timing import in_turn
@@ -21,7 +21,7 @@ from pipelines.detection import detect_points
 from render.sensor.develop import develop
 
 PART = "growth"
-POSES, SCALES, SAMPLES = (1, 2, 4), (0.5, 1.0, 2.0), (64, 256, 1024)  # poses, linear resolution, cells of a pixel
+POSES, SCALES, SAMPLES = (1, 2, 4), (0.5, 1.0, 2.0), (64, 256, 1024)  # poses, resolution along a side, cells of a pixel
 
 
 def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
@@ -49,7 +49,7 @@ def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
         yield _row(
             f"{camera}: render, with samples",
             SAMPLES,
-            [functools.partial(master_of, recipe, frame, samples) for samples in SAMPLES],
+            [functools.partial(linear_of, recipe, frame, samples) for samples in SAMPLES],
         )
 
 
@@ -69,11 +69,11 @@ def _row(what: str, sizes: Sequence[float], calls: Sequence[Callable[[], object]
 def _frame(recipe: Recipe, camera: str) -> None:
     with tempfile.TemporaryDirectory() as folder:
         frame = next(frame for frame in plan(recipe) if frame.camera.name == camera)
-        master = master_of(recipe, frame)
-        write_master(master, frame.camera.true_camera(), Path(folder) / "master.exr")
-        encode_png(develop(master.full(frame.camera.true_camera()), frame.sensor))
+        linear = linear_of(recipe, frame)
+        write_linear(linear, frame.camera.true_camera(), Path(folder) / "linear.exr")
+        encode_png(develop(linear.full(frame.camera.true_camera()), frame.sensor))
 
 
 def _image(recipe: Recipe, camera: str) -> np.ndarray:
     frame = next(frame for frame in plan(recipe) if frame.camera.name == camera)
-    return develop(master_of(recipe, frame).full(frame.camera.true_camera()), frame.sensor)
+    return develop(linear_of(recipe, frame).full(frame.camera.true_camera()), frame.sensor)

@@ -24,8 +24,8 @@ def load(recipe: str, regime: str | None) -> tuple[Any, str]:
     return parse_recipe(text, f"recipe {recipe} with --regime {regime}"), text
 
 
-def begin(recipe: str, out: Path, regime: str | None, masters: Path | None, console: Console) -> Any:
-    """The dataset of a recipe, begun or resumed in `out`, with linear light from `masters` where it fits.
+def begin(recipe: str, out: Path, regime: str | None, reuse: Path | None, console: Console) -> Any:
+    """The dataset of a recipe, begun or resumed in `out`, with linear light from `reuse` where it fits.
 
     Raises:
         UserError: a recipe, folder or plan that is not usable.
@@ -35,14 +35,14 @@ def begin(recipe: str, out: Path, regime: str | None, masters: Path | None, cons
 
     loaded, text = load(recipe, regime)
     plan(loaded)
-    if masters is not None:
-        open_dataset(masters)  # before anything is written
+    if reuse is not None:
+        open_dataset(reuse)  # before anything is written
     dataset = claim(out, loaded, text)
-    if masters is not None:
-        from datasets.store.reuse import borrow_masters
+    if reuse is not None:
+        from datasets.store.reuse import reuse_linear_images
 
-        taken, lacking = borrow_masters(dataset, masters)
-        console.print(f"masters: {taken} of {lacking} taken from {masters}; the rest is rendered")
+        taken, lacking = reuse_linear_images(dataset, reuse)
+        console.print(f"linear images: {taken} of {lacking} taken from {reuse}; the rest is rendered")
     return dataset
 
 

@@ -16,7 +16,7 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars.")]
 Regime = Annotated[
     str | None, typer.Option(help="Sensor regime, as if the recipe said so: clean, typical, paper or harsh.")
 ]
-Masters = Annotated[
+Reuse = Annotated[
     Path | None, typer.Option(metavar="DIR", help="Dataset whose linear light is taken where it shows the same views.")
 ]
 
@@ -43,7 +43,9 @@ PoseFile = Annotated[
     typer.Option(metavar="FILE", help="Poses of another system, .csv or .parquet, to be scored beside the others."),
 ]
 PosesName = Annotated[str | None, typer.Option("--name", help="Name of the poses of --poses in tables and report.")]
-Again = Annotated[bool, typer.Option("--again", help="Estimate anew what is there, as your function has changed.")]
+Overwrite = Annotated[
+    bool, typer.Option("--overwrite", help="Estimate anew what is there, as your function has changed.")
+]
 PointsName = Annotated[str, typer.Option("--points", help="detected, truth or truth+noise.")]
 CameraName = Annotated[str, typer.Option("--camera", help="Camera that is assumed: exact, nominal or paper.")]
 Use = Annotated[str, typer.Option("--use", help="Object points: four or all.")]

@@ -16,7 +16,7 @@ def run(
     recipe: o.RecipeName,
     out: o.Out,
     regime: o.Regime = None,
-    masters: o.Masters = None,
+    reuse: o.Reuse = None,
     solver: o.MoreSolvers = None,
     workers: o.Workers = 1,
     quiet: o.Quiet = False,
@@ -27,7 +27,7 @@ def run(
 
     console = Console(quiet=quiet)
     settings = [*RUN_SETTINGS, *settings_of(solver or [])]
-    dataset = begin(recipe, out, regime, masters, console)
+    dataset = begin(recipe, out, regime, reuse, console)
     stages.run_generate(dataset, workers, console)
     stages.run_detect(dataset, workers, console)
     stages.run_estimate(dataset, settings, workers, console)
@@ -46,7 +46,7 @@ def generate(
     recipe: o.RecipeName,
     out: o.Out,
     regime: o.Regime = None,
-    masters: o.Masters = None,
+    reuse: o.Reuse = None,
     workers: o.Workers = 1,
     quiet: o.Quiet = False,
 ) -> None:
@@ -54,7 +54,7 @@ def generate(
     from pipelines.stages import run as stages
 
     console = Console(quiet=quiet)
-    stages.run_generate(begin(recipe, out, regime, masters, console), workers, console)
+    stages.run_generate(begin(recipe, out, regime, reuse, console), workers, console)
 
 
 def detect(
@@ -76,7 +76,7 @@ def estimate(
     noise_px: o.NoisePx = 0.4,
     draws: o.Draws = 5,
     detector: o.DetectorName = "edge-fit",
-    again: o.Again = False,
+    overwrite: o.Overwrite = False,
     workers: o.Workers = 1,
     quiet: o.Quiet = False,
 ) -> None:
@@ -87,11 +87,11 @@ def estimate(
     setting = Setting("best" if solver is None else solver, points, camera, use, noise_px, draws, detector)
     console = Console(quiet=quiet)
     if estimator is None:
-        stages.run_estimate(opened(folder), [setting], workers, console, again=again)
+        stages.run_estimate(opened(folder), [setting], workers, console, overwrite=overwrite)
         return
     if solver is not None or setting != Setting(camera=camera):
         raise UserError("--estimator is given images: leave out --solver and the options that choose points")
-    stages.run_system(opened(folder), System(estimator, camera), workers, console, again=again)
+    stages.run_system(opened(folder), System(estimator, camera), workers, console, overwrite=overwrite)
 
 
 def score(

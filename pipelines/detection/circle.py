@@ -87,7 +87,7 @@ def find_circle(image: Grey, board: BoardMap, blur_px: float, contrast: float, t
 
 
 def _beforehand(contrast: float, height: float) -> tuple[Array, Array, Array]:
-    """Start of the shape, and mean and spread of all that `fit_disc` fits; what is not known has a wide spread.
+    """PoseBatch of the shape, and mean and spread of all that `fit_disc` fits; what is not known has a wide spread.
 
     height: of the circle above the board, radii.
     """

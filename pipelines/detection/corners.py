@@ -165,10 +165,10 @@ def _scatter(points: Array, covariance: Array, board: BoardMap, at: Array, use: 
     What the pixels' noise cannot tell is in here: rounding that runs along an edge, and what a model leaves out.
     """
     whitener = np.linalg.cholesky(np.linalg.inv(covariance[use])).transpose(0, 2, 1)
-    misses = (whitener @ (points - board(at))[use][..., None]).ravel()
-    slopes = (whitener @ board.slopes(at)[use]).reshape(len(misses), -1)
-    free = len(misses) - float(_leverage(slopes).sum())
-    return float((np.sum(misses**2) + prior) / (free + prior))
+    residuals = (whitener @ (points - board(at))[use][..., None]).ravel()
+    slopes = (whitener @ board.slopes(at)[use]).reshape(len(residuals), -1)
+    free = len(residuals) - float(_leverage(slopes).sum())
+    return float((np.sum(residuals**2) + prior) / (free + prior))
 
 
 def _leverage(slopes: Array) -> Array:

@@ -86,7 +86,10 @@ def _table(scores: pa.Table, cameras: pa.Table, title: str, cell: Callable[[Arra
     names = dict(zip(cameras["frame_id"].to_pylist(), cameras["camera_name"].to_pylist(), strict=True))
     camera = np.array([names[frame] for frame in scores["frame_id"].to_pylist()])
     key = np.array(
-        [f"{s} {c} {u}" for s, c, u in zip(*(scores[k].to_pylist() for k in ("solver", "camera", "use")), strict=True)]
+        [
+            f"{s} {c} {u}"
+            for s, c, u in zip(*(scores[k].to_pylist() for k in ("solver", "assumed_camera", "point_set")), strict=True)
+        ]
     )
     failed = np.array([status != "ok" for status in scores["status"].to_pylist()])
     values = np.stack([scores[column].to_numpy() for column in COLUMNS], axis=1)

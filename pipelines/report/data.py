@@ -24,7 +24,7 @@ ERRORS = {
     "t_error_relative": "translation, relative",
     "reprojection_rmse_px": "reprojection, px",
 }
-SETTING = ("solver", "points", "camera", "use")
+SETTING = ("solver", "point_source", "assumed_camera", "point_set")
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +36,7 @@ class Series:
     errors: dict[str, Array]  # column to values, NaN for failures
     normalised: Array  # (n, 6) errors over their stated standard deviations, NaN without
     failed: Mask
-    star: Mask
+    gross: Mask
 
 
 def series(scores: pa.Table) -> list[Series]:
@@ -47,9 +47,9 @@ def series(scores: pa.Table) -> list[Series]:
         part = scores.filter(pa.array([other == name for other in names]))
         errors = {column: part[column].to_numpy() for column in ERRORS}
         failed = np.array([status != "ok" for status in part["status"].to_pylist()])
-        star = np.array(part["star"].to_pylist())
+        gross = np.array(part["gross_failure"].to_pylist())
         normalised = np.stack([part[f"{component}_normalised"].to_numpy() for component in COMPONENTS], axis=1)
-        found.append(Series(name, part["frame_id"].to_numpy(), errors, normalised, failed, star))
+        found.append(Series(name, part["frame_id"].to_numpy(), errors, normalised, failed, gross))
     return found
 
 
@@ -65,10 +65,10 @@ def score_rows(found: list[Series], cameras: dict[int, str]) -> list[dict[str, A
             mask = camera == name
             order = np.flatnonzero(mask)[np.argsort(item.frame_id[mask], kind="stable")]
             by_frame = order.reshape(len(np.unique(item.frame_id[mask])), -1)  # every frame has all draws
-            failed, star = item.failed[by_frame], item.star[by_frame]
+            failed, gross = item.failed[by_frame], item.gross[by_frame]
             row: dict[str, Any] = {"setting": item.name, "camera": name, "n": order.size}
-            row |= {"failed": int(failed.sum()), "star": int(star.sum())}
-            row |= {"failed_rate": rate(failed), "star_rate": rate(star)}
+            row |= {"failed": int(failed.sum()), "gross": int(gross.sum())}
+            row |= {"failed_rate": rate(failed), "gross_rate": rate(gross)}
             for column in ERRORS:
                 values = np.where(failed, np.nan, np.abs(item.errors[column][by_frame]))
                 both = [bootstrap(values, statistic, resamples=FEW) for statistic in (median, percentile95)]

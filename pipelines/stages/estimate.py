@@ -17,7 +17,7 @@ from datasets.store.dataset import Dataset
 from eposit import Solution
 from eposit.arrays import Array
 from pipelines.adapters.registry import find_solver, takes_theta_centre
-from pipelines.adapters.results import Answer, Solver, gather
+from pipelines.adapters.results import PoseResult, Solver, gather
 from pipelines.adapters.user import is_given
 from pipelines.stages.detect import path_of
 from pipelines.stages.settings import Setting, assumed
@@ -76,7 +76,7 @@ def _estimate(
     if setting.use == "all":  # a point that was not found takes no part; of four, none may be missing
         chosen, batch = chosen[found], batch[:, found]
     if np.sum(found) < 4:
-        answers = [Answer("points_missing")] * len(batch)
+        answers = [PoseResult("points_missing")] * len(batch)
         solution = gather(target.points[chosen], batch, camera_of(frame), answers, single=False)
     else:
         known = setting.noise_px if noisy else None if sigma is None else sigma[chosen]

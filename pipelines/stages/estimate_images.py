@@ -18,7 +18,7 @@ from datasets.rows import decode_image, estimate_rows
 from datasets.schema import FRAMES
 from datasets.store.dataset import Dataset
 from eposit import Camera
-from pipelines.adapters.results import Answer, stack
+from pipelines.adapters.results import PoseResult, stack
 from pipelines.adapters.user import attempt, check_call, load_function
 from pipelines.stages.estimate import path_of_shard
 from pipelines.stages.settings import ALL, IMAGE, System, assumed
@@ -52,7 +52,7 @@ def run_shard(
     """
     function, target = find_estimator(system.name), dataset.recipe.target
     path = dataset.shard_path("frames", index, shard_count(dataset.recipe))
-    answers: list[Answer] = []
+    answers: list[PoseResult] = []
     notes: list[str] = []
     frames = dataset.read_shard(path, list(FRAMES.names)).to_pylist()
     for frame in frames:
@@ -66,7 +66,7 @@ def run_shard(
     return notes[0] if notes else None
 
 
-def system_rows(frame_ids: Sequence[int], system: System, answers: Sequence[Answer]) -> pa.Table:
+def system_rows(frame_ids: Sequence[int], system: System, answers: Sequence[PoseResult]) -> pa.Table:
     """Rows of `estimates`; no points were given, so there is no reprojection error."""
     key = (system.name, IMAGE, system.camera, ALL)
     return estimate_rows(frame_ids, [0] * len(frame_ids), key, stack(answers), 0)

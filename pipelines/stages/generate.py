@@ -15,11 +15,11 @@ from datasets.rows import pose_columns, table
 from datasets.schema import FRAMES, KEYPOINTS
 from datasets.store.dataset import Dataset, refused
 from datasets.store.images import encode_png
-from datasets.store.linear_images import MasterError, master_key, master_path, read_master, write_master
+from datasets.store.linear_images import LinearImageError, linear_key, linear_path, read_linear, write_linear
 from eposit.pose import tilt_rad
 from pipelines.engines.background import overlapped
-from render.frame import Master, render_master
-from render.sensor.develop import Shot, develop
+from render.frame import LinearImage, render_frame
+from render.sensor.develop import FrameContext, develop
 
 
 def is_done(dataset: Dataset, index: int) -> bool:
@@ -27,7 +27,7 @@ def is_done(dataset: Dataset, index: int) -> bool:
     count = shard_count(dataset.recipe)
     if not all(dataset.is_done(dataset.shard_path(name, index, count)) for name in ("frames", "keypoints")):
         return False
-    return all((dataset.root / master_path(frame)).is_file() for frame in _frames(dataset.recipe, index))
+    return all((dataset.root / linear_path(frame)).is_file() for frame in _frames(dataset.recipe, index))
 
 
 def run_shard(dataset: Dataset, index: int, advance: Callable[[], None] = lambda: None) -> None:
@@ -48,15 +48,15 @@ def _frames(recipe: Recipe, index: int) -> tuple[Frame, ...]:
     return plan(recipe)[index * recipe.shard_frames : (index + 1) * recipe.shard_frames]
 
 
-def _light(dataset: Dataset, frame: Frame) -> tuple[Master, bool]:
+def _light(dataset: Dataset, frame: Frame) -> tuple[LinearImage, bool]:
     """The frame's linear light, and whether it is new: read if it is there and made from the same things."""
     recipe = dataset.recipe
     try:
-        return read_master(dataset.root / master_path(frame), master_key(recipe, frame)), False
-    except MasterError:
+        return read_linear(dataset.root / linear_path(frame), linear_key(recipe, frame)), False
+    except LinearImageError:
         pass
     try:
-        return render_master(
+        return render_frame(
             recipe.target,
             recipe.light,
             frame.camera.true_camera(),
@@ -67,21 +67,21 @@ def _light(dataset: Dataset, frame: Frame) -> tuple[Master, bool]:
         raise UserError(f"frame {frame.frame_id}: {error}") from error
 
 
-def _finish(dataset: Dataset, frame: Frame, master: Master, is_new: bool) -> dict[str, object]:
-    """Write the master if it is new, develop it, and make the frame's row."""
+def _finish(dataset: Dataset, frame: Frame, linear: LinearImage, is_new: bool) -> dict[str, object]:
+    """Write the linear image if it is new, develop it, and make the frame's row."""
     recipe, spec = dataset.recipe, frame.camera
-    camera, relative = spec.true_camera(), master_path(frame)
+    camera, relative = spec.true_camera(), linear_path(frame)
     if is_new:
         try:
-            write_master(master, camera, dataset.root / relative, master_key(recipe, frame))
+            write_linear(linear, camera, dataset.root / relative, linear_key(recipe, frame))
         except OSError as error:
             raise refused(dataset.root / relative, error) from error
-    shot = Shot(recipe.target, camera, frame.cam_from_obj, frame.rate, master.region, frame.sensor_seed)
-    image = develop(master.full(camera), frame.sensor, shot)
+    shot = FrameContext(recipe.target, camera, frame.cam_from_obj, frame.rate, linear.region, frame.sensor_seed)
+    image = develop(linear.full(camera), frame.sensor, shot)
     coefficients = np.zeros(4)
     coefficients[: len(spec.coefficients)] = spec.coefficients
     region = dict(
-        zip(("region_x_px", "region_y_px", "region_width_px", "region_height_px"), master.region, strict=True)
+        zip(("region_x_px", "region_y_px", "region_width_px", "region_height_px"), linear.region, strict=True)
     )
     pose = {
         name: values[0] for name, values in pose_columns(frame.cam_from_obj.R[None], frame.cam_from_obj.t[None]).items()

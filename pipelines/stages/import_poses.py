@@ -18,7 +18,7 @@ from datasets.store.digest import table_digest
 from eposit import Pose, Status
 from eposit.arrays import Array
 from pipelines.adapters.registry import solver_names
-from pipelines.adapters.results import Answer, Failure, found
+from pipelines.adapters.results import Failure, PoseResult, pose_result
 from pipelines.stages import score
 from pipelines.stages.estimate import path_of_shard
 from pipelines.stages.estimate_images import system_rows
@@ -55,7 +55,7 @@ def import_poses(dataset: Dataset, path: Path, system: System) -> int:
     count = shard_count(dataset.recipe)
     for index in range(count):
         ids = dataset.read_shard(dataset.shard_path("frames", index, count), [FRAME])[FRAME].to_pylist()
-        rows = system_rows(ids, system, [answers.get(frame, Answer(Failure.MISSING)) for frame in ids])
+        rows = system_rows(ids, system, [answers.get(frame, PoseResult(Failure.MISSING)) for frame in ids])
         shard = path_of_shard(dataset, index, system.shard_name)
         if not (dataset.is_done(shard) and table_digest(dataset.read_shard(shard)) == table_digest(rows)):
             score.forget(dataset, shard)
@@ -71,7 +71,7 @@ def _check_name(name: str) -> None:
         raise UserError(f"name {name!r} is a solver's; give --name another one")
 
 
-def read_poses(path: Path) -> dict[int, Answer]:
+def read_poses(path: Path) -> dict[int, PoseResult]:
     """frame_id to pose. A row is a failure if its `status` says another thing than ok, or its whole pose is empty.
 
     Raises:
@@ -86,7 +86,7 @@ def read_poses(path: Path) -> dict[int, Answer]:
     t = np.stack([numbers[name] for name in position], axis=1)
     told = [str(status or "").strip() or Status.OK for status in columns.get("status", [None] * len(frames))]
     return {
-        frame: _pose(path, frame, R[i], t[i]) if status.lower() == Status.OK else Answer(status)
+        frame: _pose(path, frame, R[i], t[i]) if status.lower() == Status.OK else PoseResult(status)
         for i, (frame, status) in enumerate(zip(frames, told, strict=True))
     }
 
@@ -166,10 +166,10 @@ def _frames(path: Path, numbers: Array) -> list[int]:
     return frames
 
 
-def _pose(path: Path, frame: int, rotation: Array, t: Array) -> Answer:
+def _pose(path: Path, frame: int, rotation: Array, t: Array) -> PoseResult:
     """One row's pose. rotation: (4,) quaternion or (9,) matrix row by row."""
     if np.all(np.isnan(rotation)) and np.all(np.isnan(t)):
-        return Answer(Failure.NO_SOLUTION)
+        return PoseResult(Failure.NO_SOLUTION)
     where = f"{path}, frame_id {frame}"
     if not (np.all(np.isfinite(rotation)) and np.all(np.isfinite(t))):
         raise UserError(f"{where}: the pose has values that are not finite; a failure leaves all of them empty")
@@ -177,13 +177,13 @@ def _pose(path: Path, frame: int, rotation: Array, t: Array) -> Answer:
         length = float(np.linalg.norm(rotation))
         if abs(length - 1.0) > TOLERANCE:
             raise UserError(f"{where}: the quaternion has length {length:.6g}; it must be 1 to within {TOLERANCE:g}")
-        return found(Pose.from_quaternion(rotation, t).R, t)
+        return pose_result(Pose.from_quaternion(rotation, t).R, t)
     R = rotation.reshape(3, 3)
     off = float(np.abs(R.T @ R - np.eye(3)).max())
     if off > TOLERANCE or np.linalg.det(R) < 0.0:
         fault = f"R^T R is off by {off:.3g}" if off > TOLERANCE else "it mirrors"
         raise UserError(f"{where}: r11 to r33 are no rotation: {fault}; write it row by row, to within {TOLERANCE:g}")
-    return found(R, t)
+    return pose_result(R, t)
 
 
 def _first_line(error: Exception) -> str:

@@ -60,9 +60,9 @@ def run_detect(dataset: Dataset, workers: int, console: Console, detector: str =
 
 
 def run_estimate(
-    dataset: Dataset, settings: Iterable[Setting], workers: int, console: Console, *, again: bool = False
+    dataset: Dataset, settings: Iterable[Setting], workers: int, console: Console, *, overwrite: bool = False
 ) -> None:
-    """Estimate what is missing. again: what is there as well, for a function that has changed.
+    """Estimate what is missing. overwrite: what is there as well, for a function that has changed.
 
     Raises:
         UserError: a user's function that cannot be imported, called or understood.
@@ -71,15 +71,15 @@ def run_estimate(
         find_solver(setting.solver)
         is_done = functools.partial(estimate.is_done, setting=setting)
         run_shard = functools.partial(estimate.run_shard, setting=setting)
-        _run_answers(dataset, setting.name, is_done, run_shard, workers, console, again=again)
+        _run_answers(dataset, setting.name, is_done, run_shard, workers, console, overwrite=overwrite)
 
 
-def run_system(dataset: Dataset, system: System, workers: int, console: Console, *, again: bool = False) -> None:
-    """Give every image that is missing to a user's whole system; `again` and errors as `run_estimate`."""
+def run_system(dataset: Dataset, system: System, workers: int, console: Console, *, overwrite: bool = False) -> None:
+    """Give every image that is missing to a user's whole system; `overwrite` and errors as `run_estimate`."""
     find_estimator(system.name)
     is_done = functools.partial(systems.is_done, system=system)
     run_shard = functools.partial(systems.run_shard, system=system)
-    _run_answers(dataset, system.shard_name, is_done, run_shard, workers, console, again=again, by_frame=True)
+    _run_answers(dataset, system.shard_name, is_done, run_shard, workers, console, overwrite=overwrite, by_frame=True)
 
 
 def run_import(dataset: Dataset, path: Path, system: System, console: Console) -> None:
@@ -102,17 +102,17 @@ def _run_answers(
     workers: int,
     console: Console,
     *,
-    again: bool,
+    overwrite: bool,
     by_frame: bool = False,
 ) -> None:
     """Make the shards of estimates that have a name, and tell how often a user's function failed."""
     indices = range(shard_count(dataset.recipe))
     paths = [estimate.path_of_shard(dataset, index, name) for index in indices]
-    if again:
+    if overwrite:
         for path in paths:
             score.forget(dataset, path)
             dataset.remove_shard(path)
-    hint = "; --again makes them again"
+    hint = "; --overwrite makes them again"
     notes = _run(
         f"estimate {name}", dataset, indices, is_done, run_shard, workers, console, by_frame=by_frame, hint=hint
     )

@@ -16,13 +16,13 @@ import numpy as np
 
 from render import backend
 from render.analytic.edge_coverage import half_reach, share_beyond
-from render.analytic.rays import Bundle, View
-from render.light import Light, shade_radius, shading_map
+from render.analytic.rays import Bundle, DeviceCamera
+from render.light import Light, shading_map, shadow_radius
 from render.targets.chessboard import Target
 
 EDGE_REACH = 1.1  # of half a pixel: how near an edge counts as crossing it; within it a lens bends by a percent
 FAR = 1e6  # mm; what lies farther, or is not finite, is taken for this
-TAME_SQUARES = 2.0  # a cell that reaches farther on the board is taken for the point in its middle
+LINEAR_SQUARES = 2.0  # a cell that reaches farther on the board is taken for the point in its middle
 SMOOTH, ONE_EDGE, MANY_EDGES = 0, 1, 2  # what crosses a pixel
 
 
@@ -39,7 +39,7 @@ class Board:
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class CellSample:
     """What cells see."""
 
     radiance: Any  # Float, of the target alone: a cell that it fills by half has half
@@ -72,20 +72,20 @@ def uploaded(target: Target, light: Light) -> Board:
         extent=up(*target.extent_mm),
         squares=up(-target.square_mm, -target.square_mm, target.square_mm, target.columns, target.rows),
         reflectance=up(target.white, target.black),
-        circle=up(*target.circle_centre, target.circle_radius_mm, circle * target.circle, shade_radius(target, light)),
+        circle=up(*target.circle_centre, target.circle_radius_mm, circle * target.circle, shadow_radius(target, light)),
         shading=mi.Float(shading.astype(np.float32).ravel()),
         texels=up(columns, rows),
     )
 
 
-def look(board: Board, view: View, x_px: Any, y_px: Any, size: Any) -> Look:
+def sample_cells(board: Board, view: DeviceCamera, x_px: Any, y_px: Any, size: Any) -> CellSample:
     """What cells see whose middles are at x_px, y_px and whose sides are `size`, px."""
     mi, dr = backend.load(), backend.jit()
     rays = view.rays(x_px, y_px)
     cx, cy, cz, radius, circle_radiance, shade = board.circle
     hit = _meet(view, rays, cz, size)
     distance, *toward = _polar(hit, cx, cy)
-    circle = share_beyond(radius - distance, *_tame(toward, board))
+    circle = share_beyond(radius - distance, *_drop_nonlinear_steps(toward, board))
     circle = dr.select(hit.met, circle, 0.0)
     rim = hit.met & (dr.abs(distance - radius) <= EDGE_REACH * half_reach(*toward))
     under_circle = hit.met & ~rim & (distance < radius)
@@ -99,10 +99,10 @@ def look(board: Board, view: View, x_px: Any, y_px: Any, size: Any) -> Look:
     radiance = circle * circle_radiance + board_share * reflectance * _shading(board, hit)
     front = rays.direction.z > 0.0  # a back side is black
     seen = dr.select(rays.seen, 1.0, 0.0)
-    return Look(dr.select(front, radiance, 0.0) * seen, (circle + board_share) * seen, mi.UInt32(crossed))
+    return CellSample(dr.select(front, radiance, 0.0) * seen, (circle + board_share) * seen, mi.UInt32(crossed))
 
 
-def _meet(view: View, rays: Bundle, z: Any, size: Any) -> Hit:
+def _meet(view: DeviceCamera, rays: Bundle, z: Any, size: Any) -> Hit:
     """Where rays meet the plane at z, mm."""
     dr = backend.jit()
     direction = rays.direction
@@ -130,10 +130,10 @@ def _polar(hit: Hit, x: Any, y: Any) -> tuple[Any, Any, Any]:
     return distance, *(ux * a + uy * b for a, b in zip(hit.steps_x, hit.steps_y, strict=True))
 
 
-def _tame(steps: Sequence[Any], board: Board) -> list[Any]:
+def _drop_nonlinear_steps(steps: Sequence[Any], board: Board) -> list[Any]:
     """Changes over a cell, or none where they are too large to be taken for linear: near a plane's horizon."""
     dr = backend.jit()
-    fine = half_reach(*steps) <= TAME_SQUARES * board.squares[2]
+    fine = half_reach(*steps) <= LINEAR_SQUARES * board.squares[2]
     return [dr.select(fine, step, 0.0) for step in steps]
 
 
@@ -147,7 +147,7 @@ def _board(board: Board, hit: Hit) -> tuple[Any, Any, Any]:
         (hit.x, hit.steps_x, first_x, columns, x0, x1),
         (hit.y, hit.steps_y, first_y, rows, y0, y1),
     ):
-        reach, steps = EDGE_REACH * half_reach(*raw_steps), _tame(raw_steps, board)
+        reach, steps = EDGE_REACH * half_reach(*raw_steps), _drop_nonlinear_steps(raw_steps, board)
         border = dr.minimum(value - low, high - value)
         share *= share_beyond(border, *steps)
         border_near.append(dr.select(dr.abs(border) <= reach, ONE_EDGE, SMOOTH))

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from eposit import Camera, Pose
 from render import backend
-from render.analytic.cells import MANY_EDGES, ONE_EDGE, SMOOTH, Board, look, uploaded
+from render.analytic.cells import MANY_EDGES, ONE_EDGE, SMOOTH, Board, sample_cells, uploaded
 from render.analytic.image_circle import uploaded_coverage
-from render.analytic.rays import View, view_of
+from render.analytic.rays import DeviceCamera, device_camera
 from render.light import Light
 from render.targets.chessboard import Target
 
@@ -40,13 +40,13 @@ def trace(
     """
     mi, dr = backend.load(), backend.jit()
     x, y, width, height = region
-    board, view = uploaded(target, light), view_of(camera, cam_from_obj)
+    board, view = uploaded(target, light), device_camera(camera, cam_from_obj)
     background = dr.opaque(mi.Float, light.background)
     corner = tuple(dr.opaque(mi.Int32, value) for value in (x, y, width))
     x_px, y_px = _middle(dr.arange(mi.Int32, width * height), corner)
     place = mi.UInt32(mi.Int32(y_px) * dr.opaque(mi.Int32, camera.width) + mi.Int32(x_px))
     seen = dr.gather(mi.Float, uploaded_coverage(camera), place)
-    found = look(board, view, x_px, y_px, mi.Float(1.0))
+    found = sample_cells(board, view, x_px, y_px, mi.Float(1.0))
     picture = found.radiance + background * dr.maximum(seen - found.filled, 0.0)
     crossed = dr.select((seen > 0.0) & (seen < 1.0), MANY_EDGES, dr.select(seen > 0.0, found.crossed, SMOOTH))
     dr.eval(picture, crossed, seen)
@@ -61,7 +61,7 @@ def trace(
     return np.array(picture).reshape(height, width)
 
 
-def _mean(board: Board, view: View, middle: tuple[Any, Any], cells: int) -> tuple[Any, Any]:
+def _mean(board: Board, view: DeviceCamera, middle: tuple[Any, Any], cells: int) -> tuple[Any, Any]:
     """Mean radiance and mean share of the target of pixels, each divided into `cells`."""
     mi, dr = backend.load(), backend.jit()
     dr.eval(middle)
@@ -74,7 +74,7 @@ def _mean(board: Board, view: View, middle: tuple[Any, Any], cells: int) -> tupl
     size = mi.Float(1.0 / side)
     x_px = dr.gather(mi.Float, middle[0], pixel) + ((mi.Float(column) + 0.5) * size - 0.5)
     y_px = dr.gather(mi.Float, middle[1], pixel) + ((mi.Float(row) + 0.5) * size - 0.5)
-    found = look(board, view, x_px, y_px, size)
+    found = sample_cells(board, view, x_px, y_px, size)
     dr.eval(found.radiance, found.filled)
     # Sums over the contiguous block of a pixel's cells: no atomic additions, the same bits every time.
     return tuple(dr.block_sum(value, cells) * (size * size) for value in (found.radiance, found.filled))

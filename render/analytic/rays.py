@@ -7,7 +7,7 @@ from typing import Any
 
 from eposit import Camera, Pose
 from render import backend
-from render.lens_law import Law, opaque_law, sine_cosine
+from render.lens_law import DeviceLens, device_lens, sine_cosine
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,10 +21,10 @@ class Bundle:
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class DeviceCamera:
     """A camera at a pose, uploaded."""
 
-    law: Law
+    law: DeviceLens
     focal: list[Any]  # fx, fy, px
     centre: list[Any]  # cx, cy, px
     rotation: list[Any]  # nine numbers of obj_from_cam, row by row
@@ -53,10 +53,10 @@ class View:
         return mi.Vector3f(*(r[i] * v[0] + r[i + 1] * v[1] + r[i + 2] * v[2] for i in (0, 3, 6)))
 
 
-def view_of(camera: Camera, cam_from_obj: Pose) -> View:
+def device_camera(camera: Camera, cam_from_obj: Pose) -> DeviceCamera:
     """Upload a camera at a pose."""
     mi, dr = backend.load(), backend.jit()
     obj_from_cam = cam_from_obj.inverse()
     numbers = [camera.fx, camera.fy, camera.cx, camera.cy, *obj_from_cam.R.ravel(), *obj_from_cam.t]
     up = [dr.opaque(mi.Float, float(value)) for value in numbers]
-    return View(opaque_law(mi, dr, camera.lens, camera.coefficients), up[:2], up[2:4], up[4:13], up[13:])
+    return DeviceCamera(device_lens(mi, dr, camera.lens, camera.coefficients), up[:2], up[2:4], up[4:13], up[13:])

@@ -13,7 +13,7 @@ import numpy as np
 
 from eposit import Camera, Pose
 from render import backend
-from render.lens_law import opaque_law, sine_cosine
+from render.lens_law import device_lens, sine_cosine
 
 SENSOR = "eposit_fisheye"
 HALF_PIXEL = 0.5
@@ -70,7 +70,7 @@ def register_sensor() -> None:
             fx, fy, cx, cy = (props[name] for name in ("fx", "fy", "cx", "cy"))
             to_world = np.array(props["to_world"].matrix, dtype=np.float64)
             size, offset = self.film().crop_size(), self.film().crop_offset()
-            self.law = opaque_law(mi, dr, props["lens"], coefficients)
+            self.law = device_lens(mi, dr, props["lens"], coefficients)
             # From the film position in [0, 1] of the crop to normalised image coordinates. The constants are worked
             # out in double precision: at 1600 px a float32 coordinate is only good to 1e-4 px.
             scale = np.array([size.x / fx, size.y / fy])

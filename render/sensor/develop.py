@@ -27,7 +27,7 @@ SHORT_PX = 0.5  # up to here nine weights with the right moments are within half
 
 
 @dataclass(frozen=True, slots=True)
-class Shot:
+class FrameContext:
     """What the sensor has to know of a frame besides its light."""
 
     target: Target
@@ -38,7 +38,7 @@ class Shot:
     seed: int  # of the noise and of the light's direction
 
 
-def develop(radiance: Image, model: SensorModel, shot: Shot | None = None) -> NDArray[np.uint8]:
+def develop(radiance: Image, model: SensorModel, shot: FrameContext | None = None) -> NDArray[np.uint8]:
     """(height, width) linear radiance to 8-bit grey values of the same size.
 
     shot: the frame, for models with noise, motion or uneven light.
@@ -88,7 +88,7 @@ def _spread(light: Image, model: SensorModel) -> Image:
     return light
 
 
-def _moved(light: Image, model: SensorModel, shot: Shot) -> Image:
+def _moved(light: Image, model: SensorModel, shot: FrameContext) -> Image:
     """The mean over the exposure of the light around the board, which moves with it.
 
     The lens's spread comes first, though the light moves before: over its few pixels the motion is the same, so the

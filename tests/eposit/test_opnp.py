@@ -274,7 +274,7 @@ def test_failures_have_a_status_and_a_nan_pose():
     cases = {
         "non_finite": (PAPER_OBJECT, broken, camera),
         "outside_lens": (PAPER_OBJECT, outside, camera),
-        "field_angle": (PAPER_OBJECT, wide.project(far.apply(PAPER_OBJECT)), wide),
+        "beyond_90_degrees": (PAPER_OBJECT, wide.project(far.apply(PAPER_OBJECT)), wide),
         "coplanar": (line, camera.project(pose.apply(line)), camera),
         "no_solution": (PAPER_OBJECT, np.full((4, 2), 700.0), camera),
     }

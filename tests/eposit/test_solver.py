@@ -157,7 +157,9 @@ def test_statuses():
         assert eposit.solve(flat, camera.project(pose.apply(flat)), camera, method).status == "coplanar"
     past = paper_camera("equidistance")
     far = Pose(pose.R, np.array([2000.0, 0.0, -50.0]))
-    assert eposit.solve(PAPER_OBJECT, past.project(far.apply(PAPER_OBJECT)), past, "eposit").status == "field_angle"
+    assert (
+        eposit.solve(PAPER_OBJECT, past.project(far.apply(PAPER_OBJECT)), past, "eposit").status == "beyond_90_degrees"
+    )
     assert eposit.solve(PAPER_OBJECT, past.project(far.apply(PAPER_OBJECT)), past).status == "ok"
 
 

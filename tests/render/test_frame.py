@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from datasets.store.images import decode_png, encode_png
-from datasets.store.linear_images import MasterError, read_master, write_master
+from datasets.store.linear_images import LinearImageError, read_linear, write_linear
 from eposit import Camera, Pose
 from eposit.pose import rotation_from_euler
 from render import backend
 from render.analytic.image_circle import lens_coverage
-from render.frame import render_master
+from render.frame import render_frame
 from render.light import Light, lamp_irradiance
 from render.region import target_region
 from render.sensor.develop import SensorModel, develop
@@ -30,17 +30,17 @@ def pose(tilt=35.0, depth=1300.0):
 @pytest.mark.parametrize("camera", [CAMERA, CAMERA.replace(lens="perspective", fx=300.0, fy=301.0)])
 def test_region_has_the_bits_of_the_whole_picture(camera):
     region = target_region(TARGET, camera, pose())
-    part = render_master(TARGET, LIGHT, camera, pose(), samples=16)
+    part = render_frame(TARGET, LIGHT, camera, pose(), samples=16)
     assert part.region == region
     assert region[2] * region[3] < 0.8 * camera.width * camera.height
-    whole = render_master(TARGET, LIGHT, camera, pose(), samples=16, region=(0, 0, camera.width, camera.height))
+    whole = render_frame(TARGET, LIGHT, camera, pose(), samples=16, region=(0, 0, camera.width, camera.height))
     np.testing.assert_array_equal(part.full(camera), whole.radiance)
 
 
 def test_nothing_is_random():
-    first = render_master(TARGET, LIGHT, CAMERA, pose(), samples=16).radiance
-    render_master(TARGET, LIGHT, CAMERA, pose(50.0), samples=64)
-    np.testing.assert_array_equal(first, render_master(TARGET, LIGHT, CAMERA, pose(), samples=16).radiance)
+    first = render_frame(TARGET, LIGHT, CAMERA, pose(), samples=16).radiance
+    render_frame(TARGET, LIGHT, CAMERA, pose(50.0), samples=64)
+    np.testing.assert_array_equal(first, render_frame(TARGET, LIGHT, CAMERA, pose(), samples=16).radiance)
 
 
 @pytest.mark.parametrize(("lens", "focal"), [("orthogonal", 180.0), ("kannala_brandt", 180.0), ("perspective", 300.0)])
@@ -49,13 +49,13 @@ def test_standard_cells_give_the_mean_of_the_pixel(lens, focal, tilt, depth):
     """64 cells in the pixels that edges cross, and fewer elsewhere, against 64 cells of each of 64 parts of a pixel."""
     k = (-0.04, 0.003, -0.0004, 0.00002) if lens == "kannala_brandt" else ()
     camera = CAMERA.replace(lens=lens, fx=focal, fy=focal + 0.5, coefficients=k)
-    ours = render_master(TARGET, LIGHT, camera, pose(tilt, depth), samples=64)
+    ours = render_frame(TARGET, LIGHT, camera, pose(tilt, depth), samples=64)
     # Eight times the resolution: its pixels are parts of ours, and all of its edges are its own.
     cx, cy = (8.0 * c + 3.5 for c in (camera.cx, camera.cy))
     fine_camera = camera.replace(fx=8 * camera.fx, fy=8 * camera.fy, cx=cx, cy=cy, width=3200, height=2400)
     x, y, width, height = ours.region
     region = (8 * x, 8 * y, 8 * width, 8 * height)
-    fine = render_master(TARGET, LIGHT, fine_camera, pose(tilt, depth), samples=64, region=region)
+    fine = render_frame(TARGET, LIGHT, fine_camera, pose(tilt, depth), samples=64, region=region)
     mean = fine.radiance.reshape(height, 8, width, 8).mean(axis=(1, 3), dtype=np.float64)
     grey = 255.0 * 0.8 * np.abs(ours.radiance - mean)
     # Where edges meet within a cell of 1/64 pixel, their product may be wrong by a third of it: 0.3 / 64 of 150 grey
@@ -65,8 +65,8 @@ def test_standard_cells_give_the_mean_of_the_pixel(lens, focal, tilt, depth):
 
 
 def test_looked_up_light_is_mitsubas_light():
-    ours = render_master(TARGET, LIGHT, CAMERA, pose(), samples=64)
-    theirs = render_master(TARGET, LIGHT, CAMERA, pose(), samples=256, seed=2, reference=True)
+    ours = render_frame(TARGET, LIGHT, CAMERA, pose(), samples=64)
+    theirs = render_frame(TARGET, LIGHT, CAMERA, pose(), samples=256, seed=2, reference=True)
     difference = 255.0 * 0.8 * (ours.radiance - theirs.radiance)
     # 256 x 4 lamp samples leave 0.7 grey levels in a white pixel, more at an edge, and 0.005 in the mean of 25000.
     assert abs(difference.mean()) < 0.03
@@ -89,8 +89,8 @@ def test_looked_up_light_is_mitsubas_light():
 def test_developed_picture_is_that_of_4096_path_traced_rays(lens, focal, tilt, depth):
     """No pixel off by more than one grey level, and the mean by less than 0.05."""
     camera = CAMERA.replace(lens=lens, fx=focal, fy=focal + 0.5)
-    ours = render_master(TARGET, LIGHT, camera, pose(tilt, depth), samples=64)
-    theirs = render_master(TARGET, LIGHT, camera, pose(tilt, depth), samples=4096, seed=2, reference=True)
+    ours = render_frame(TARGET, LIGHT, camera, pose(tilt, depth), samples=64)
+    theirs = render_frame(TARGET, LIGHT, camera, pose(tilt, depth), samples=4096, seed=2, reference=True)
     a, b = (develop(master.full(camera), SensorModel()).astype(int) for master in (ours, theirs))
     linear = 255.0 * 0.8 * (ours.radiance - theirs.radiance)
     worst = np.unravel_index(np.argmax(np.abs(linear)), linear.shape)
@@ -134,7 +134,7 @@ def test_pixels_outside_the_image_circle_are_black():
     y = np.arange(300) - CAMERA.cy
     chord = 2 * CAMERA.fx * np.sqrt(np.maximum(0.0, 1.0 - (y / CAMERA.fy) ** 2))
     assert coverage.sum() == pytest.approx(chord.sum(), rel=1e-3)
-    picture = render_master(TARGET, LIGHT, CAMERA, pose(), samples=4).full(CAMERA)
+    picture = render_frame(TARGET, LIGHT, CAMERA, pose(), samples=4).full(CAMERA)
     assert picture[0, 0] == 0.0
     assert picture[150, 60] == pytest.approx(LIGHT.background)
 
@@ -142,22 +142,22 @@ def test_pixels_outside_the_image_circle_are_black():
 def test_exr_round_trip_with_data_window(tmp_path, capfd):
     import OpenEXR
 
-    master = render_master(TARGET, LIGHT, CAMERA, pose(), samples=4)
+    master = render_frame(TARGET, LIGHT, CAMERA, pose(), samples=4)
     path = tmp_path / "frame.exr"
-    write_master(master, CAMERA, path, "key")
-    back = read_master(path, "key")
+    write_linear(master, CAMERA, path, "key")
+    back = read_linear(path, "key")
     np.testing.assert_array_equal(back.radiance, master.radiance)
     assert back.region == master.region
     header = OpenEXR.File(str(path)).header()
     assert tuple(header["displayWindow"][1]) == (CAMERA.width - 1, CAMERA.height - 1)
     assert tuple(header["dataWindow"][0]) == master.region[:2]
-    with pytest.raises(MasterError, match="another frame"):
-        read_master(path, "other key")
+    with pytest.raises(LinearImageError, match="another frame"):
+        read_linear(path, "other key")
     whole = path.read_bytes()
     for kept in (200, len(whole) // 2):  # within the header, and within the pixels
         path.write_bytes(whole[:kept])
-        with pytest.raises(MasterError, match="cannot be read"):
-            read_master(path, "key")
+        with pytest.raises(LinearImageError, match="cannot be read"):
+            read_linear(path, "key")
     assert capfd.readouterr() == ("", "")
 
 
@@ -201,7 +201,7 @@ def test_a_new_pose_region_or_camera_compiles_nothing():
     def kernels(camera, where):
         with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
             dr.kernel_history_clear()
-            render_master(TARGET, LIGHT, camera, where, samples=16)
+            render_frame(TARGET, LIGHT, camera, where, samples=16)
             return {kernel["hash"] for kernel in dr.kernel_history() if "hash" in kernel}
 
     first = kernels(CAMERA, pose())

@@ -23,12 +23,12 @@ from datasets.errors import UserError
 from datasets.plan import Frame
 from datasets.recipe.model import Recipe
 from pipelines.bench.blender.scene import LENS, description
-from pipelines.bench.cases import chosen_frames, corner_errors, master_of, over_background, rms
+from pipelines.bench.cases import chosen_frames, corner_errors, linear_of, over_background, rms
 from pipelines.bench.frame import frame_of_ours
 from pipelines.bench.table import Row, compared, noted
 from pipelines.bench.timing import Times, in_turn, mean_of
 from render import backend
-from render.frame import Master
+from render.frame import LinearImage
 from render.region import Image, Region, target_region
 
 PART = "blender"
@@ -55,13 +55,13 @@ def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
     with tempfile.TemporaryDirectory() as folder, cycles(python, scene, Path(folder)) as (blender, version):
         picture = Path(folder) / "region.exr"
         blender.render(region, picture)  # and warms up
-        theirs, ours = over_background(recipe, camera, _read(picture), region), master_of(recipe, frame)
+        theirs, ours = over_background(recipe, camera, _read(picture), region), linear_of(recipe, frame)
         yield from _checks(recipe, frame, ours, theirs, version)
         frame_of_ours(recipe, frame)
         part, that_part, whole, all_of_it, that_whole = in_turn(
-            lambda: mean_of(functools.partial(master_of, recipe, frame), IN_A_ROW),
+            lambda: mean_of(functools.partial(linear_of, recipe, frame), IN_A_ROW),
             functools.partial(blender.render, region),
-            lambda: mean_of(lambda: master_of(recipe, frame).full(camera), IN_A_ROW),
+            lambda: mean_of(lambda: linear_of(recipe, frame).full(camera), IN_A_ROW),
             lambda: mean_of(functools.partial(frame_of_ours, recipe, frame), IN_A_ROW),
             functools.partial(blender.render, None),
             warm_up=False,
@@ -165,10 +165,10 @@ def _read(path: Path) -> Image:
         return np.array(file.channels()["RGBA"].pixels)[..., [0, 3]]
 
 
-def _checks(recipe: Recipe, frame: Frame, ours: Master, theirs: Master, version: str) -> Iterator[Row]:
+def _checks(recipe: Recipe, frame: Frame, ours: LinearImage, theirs: LinearImage, version: str) -> Iterator[Row]:
     """Whether both show the same: corners against truth, and light."""
     name, rays = frame.camera.name, f"Cycles {version}, {SAMPLES} rays"
-    own, that = (rms([corner_errors(recipe, frame, master)]) for master in (ours, theirs))
+    own, that = (rms([corner_errors(recipe, frame, linear)]) for linear in (ours, theirs))
     yield noted(PART, f"{name}: corners, ours", f"{own:.4f} px RMS", f"corners, {rays}", f"{that:.4f} px RMS")
     light = float(theirs.radiance.mean() / ours.radiance.mean())
     yield noted(PART, f"{name}: mean light of the region", "1", f"mean light, {rays}", f"{light:.4f}")

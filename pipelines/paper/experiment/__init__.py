@@ -21,8 +21,8 @@ from pipelines.paper.experiment.calibration import AT_ONCE
 from pipelines.paper.experiment.claims import Cost, Found, claims, timed
 from pipelines.paper.experiment.pictures import (
     HARD,
+    MethodResult,
     Pictures,
-    Way,
     by_best,
     by_eposit,
     by_released,
@@ -74,7 +74,7 @@ def compare(pictures: Pictures) -> Found:
     """Every way of estimating on the pictures."""
     camera, way = calibrated(pictures, "calibration")
     try:
-        plain: Way | str = calibrated(pictures, "calibration in one call", AT_ONCE)[1]
+        plain: MethodResult | str = calibrated(pictures, "calibration in one call", AT_ONCE)[1]
     except cv2.error as error:
         plain = str(error.err)
     nominal, four = pictures.nominal, pictures.four
@@ -182,7 +182,7 @@ def _times(cost: Cost) -> Table:
     )  # fmt: skip
 
 
-def _pose_error(way: Way, truth: Pose, i: int) -> str:
+def _pose_error(way: MethodResult, truth: Pose, i: int) -> str:
     if way.status[i] != "ok":
         return way.status[i]
     return f"{way.turn_rad(truth)[i]:.2g}; {np.linalg.norm(way.shift_mm(truth)[i]):.2g}"

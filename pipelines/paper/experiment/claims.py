@@ -16,7 +16,7 @@ from pipelines.detection import detect_points
 from pipelines.paper.claims import Claim, Verdict
 from pipelines.paper.experiment.calibration import Calibration
 from pipelines.paper.experiment.figures import LIMIT_RAD, LIMITS_MM
-from pipelines.paper.experiment.pictures import HARD, Pictures, Way, by_eposit, by_released
+from pipelines.paper.experiment.pictures import HARD, MethodResult, Pictures, by_eposit, by_released
 from pipelines.statistics import Interval, bootstrap, mean, median
 
 PART = "experiment"
@@ -31,17 +31,17 @@ class Found:
 
     pictures: Pictures
     camera: Calibration
-    calibration: Way
-    at_once: Way | str  # or why there is none
-    eposit: Way
-    eposit_all: Way
-    released: Way
-    best_four: Way
-    best: Way
-    exact: Way
+    calibration: MethodResult
+    at_once: MethodResult | str  # or why there is none
+    eposit: MethodResult
+    eposit_all: MethodResult
+    released: MethodResult
+    best_four: MethodResult
+    best: MethodResult
+    exact: MethodResult
 
     @property
-    def ways(self) -> list[Way]:
+    def ways(self) -> list[MethodResult]:
         """All that are there."""
         at_once = [] if isinstance(self.at_once, str) else [self.at_once]
         others = [self.eposit, self.eposit_all, self.released, self.best_four, self.best, self.exact]
@@ -117,11 +117,11 @@ def _differences(found: Found) -> list[Claim]:
     ]  # fmt: skip
 
 
-def _turns(found: Found, way: Way) -> Array:
+def _turns(found: Found, way: MethodResult) -> Array:
     return np.abs(way.rotation_rad(found.calibration.cam_from_obj))
 
 
-def _shifts(found: Found, way: Way) -> Array:
+def _shifts(found: Found, way: MethodResult) -> Array:
     return np.abs(way.shift_mm(found.calibration.cam_from_obj))
 
 
@@ -129,7 +129,7 @@ def _ordinary(found: Found, values: Array | Mask) -> Array:
     return values[found.pictures.ordinary].astype(np.float64)
 
 
-def _share(found: Found, way: Way, within: Callable[[Way], Mask]) -> str:
+def _share(found: Found, way: MethodResult, within: Callable[[MethodResult], Mask]) -> str:
     inside = _ordinary(found, within(way))
     answers = sum(way.status[i] == "ok" for i in np.flatnonzero(found.pictures.ordinary))
     share = bootstrap(100.0 * inside, mean).text(3, "%")
@@ -142,7 +142,7 @@ def _verdict(inside: Array, least: float) -> Verdict:
 
 
 def _reprojection(found: Found) -> Claim:
-    def told(way: Way) -> str:
+    def told(way: MethodResult) -> str:
         used, board = (bootstrap(_ordinary(found, values), mean) for values in (way.used_px, way.board_px))
         return f"{used.text(2, 'px')} over its four points, {board.text(2, 'px')} over the board"
 
@@ -208,7 +208,7 @@ def _times_claim(cost: Cost) -> Claim:
 
 
 def _more_points(found: Found) -> Claim:
-    def told(four: Way, every: Way) -> str:
+    def told(four: MethodResult, every: MethodResult) -> str:
         truth = found.pictures.cam_from_obj
         errors = (bootstrap(_ordinary(found, way.turn_rad(truth)), median).text(2, "rad") for way in (four, every))
         return "{}: {} with four, {} with all".format(four.name.partition(",")[0], *errors)

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from eposit.arrays import Array
 from eposit.pose import euler_from_rotation
-from pipelines.paper.experiment.pictures import HARD, Pictures, Way
+from pipelines.paper.experiment.pictures import HARD, MethodResult, Pictures
 from pipelines.report.svg import STYLE, svg
 
 MARKS = ("o", "x", "+", "s")
@@ -20,7 +20,7 @@ LIMIT_RAD, LIMITS_MM = 0.2, (50.0, 50.0, 200.0)  # the paper's
 PAPER_PX = 1.4
 
 
-def poses_figure(pictures: Pictures, ways: Sequence[Way]) -> str:
+def poses_figure(pictures: Pictures, ways: Sequence[MethodResult]) -> str:
     """Angles and translations of every picture, with the truth as a line."""
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(3, 2, figsize=(11, 7), layout="constrained", sharex=True)
@@ -36,7 +36,7 @@ def poses_figure(pictures: Pictures, ways: Sequence[Way]) -> str:
         return _finished(figure, axes)
 
 
-def differences_figure(pictures: Pictures, way: Way, calibration: Way) -> str:
+def differences_figure(pictures: Pictures, way: MethodResult, calibration: MethodResult) -> str:
     """Differences of a way from the calibration, and the errors of both, with the paper's limits."""
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(3, 2, figsize=(11, 7), layout="constrained", sharex=True)
@@ -58,7 +58,7 @@ def differences_figure(pictures: Pictures, way: Way, calibration: Way) -> str:
         return _finished(figure, axes)
 
 
-def reprojection_figure(pictures: Pictures, ways: Sequence[Way]) -> str:
+def reprojection_figure(pictures: Pictures, ways: Sequence[MethodResult]) -> str:
     """Reprojection errors of every picture over the points used, logarithmic, with the paper's mean."""
     with plt.rc_context(STYLE):
         figure, axis = plt.subplots(figsize=(9, 3.4), layout="constrained")

@@ -45,7 +45,7 @@ class Pictures:
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
+class MethodResult:
     """One way of estimating, on b pictures."""
 
     name: str
@@ -88,7 +88,7 @@ def _told(statuses: list[str]) -> str:
     return f"{len(statuses) - len(bad)} points, {bad[0]}" if bad else "ok"
 
 
-def calibrated(pictures: Pictures, name: str, calls: tuple[int, ...] = STAGED) -> tuple[Calibration, Way]:
+def calibrated(pictures: Pictures, name: str, calls: tuple[int, ...] = STAGED) -> tuple[Calibration, MethodResult]:
     """OpenCV's calibration over all pictures, and its poses as a way of estimating; `calls` as for `calibrate`.
 
     Raises:
@@ -99,7 +99,7 @@ def calibrated(pictures: Pictures, name: str, calls: tuple[int, ...] = STAGED) -
     found = calibrate(pictures.target.corners, pictures.points_px[:, corners], size, pictures.nominal.fx, calls)
     status = ["ok" if np.isfinite(rmse) else "points_missing" for rmse in found.rmse_px]
     board = [_rmse(_calibrated_px(found, pictures, i), pictures.points_px[i]) for i in range(len(status))]
-    return found, Way(name, status, found.cam_from_obj, found.rmse_px, np.array(board))
+    return found, MethodResult(name, status, found.cam_from_obj, found.rmse_px, np.array(board))
 
 
 def _calibrated_px(found: Calibration, pictures: Pictures, i: int) -> Array:
@@ -129,7 +129,9 @@ def by_best(points: Array, pixels: Array, camera: Camera, sigma: Array) -> Solut
     return eposit.solve(points, pixels, camera, sigma_px=sigma)
 
 
-def estimated(name: str, pictures: Pictures, solve: Solve, camera: Camera, use: list[int] | None = None) -> Way:
+def estimated(
+    name: str, pictures: Pictures, solve: Solve, camera: Camera, use: list[int] | None = None
+) -> MethodResult:
     """A solver on every picture by itself. use: rows of the target's points; all that were found if None."""
     b = len(pictures.points_px)
     R, t, status = np.full((b, 3, 3), np.nan), np.full((b, 3), np.nan), list[str]()
@@ -147,7 +149,7 @@ def estimated(name: str, pictures: Pictures, solve: Solve, camera: Camera, use: 
         R[i], t[i] = found.cam_from_obj.R, found.cam_from_obj.t
         again = camera.project(found.cam_from_obj.apply(pictures.target.points))
         used_px[i], board_px[i] = _rmse(again[rows], pixels[rows]), _rmse(again, pixels)
-    return Way(name, status, Pose(R, t), used_px, board_px)
+    return MethodResult(name, status, Pose(R, t), used_px, board_px)
 
 
 def _rmse(projected: Array, pixels: Array) -> float:

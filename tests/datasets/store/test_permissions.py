@@ -57,7 +57,7 @@ def test_a_new_dataset_in_a_read_only_folder(public, cli):
     ("words", "without"),
     [
         (("estimate", "--solver", "posit"), ()),
-        (("estimate", "--again"), ()),
+        (("estimate", "--overwrite"), ()),
         (("score",), ("scores",)),
         (("report",), ()),
     ],

@@ -97,11 +97,11 @@ PLACES = {
     "no dataset": (lambda place: ("detect", place.folder), "holds no dataset (recipe.toml is missing)"),
     "dataset is a file": (lambda place: ("verify", place.recipe()), "holds no dataset"),
     "masters from nowhere": (
-        lambda place: ("generate", place.recipe(), "--out", place.new(), "--masters", place.folder / "no"),
+        lambda place: ("generate", place.recipe(), "--out", place.new(), "--reuse", place.folder / "no"),
         "holds no dataset (recipe.toml is missing)",
     ),
     "masters from here": (
-        lambda place: ("generate", place.recipe(), "--out", (root := place.dataset()), "--masters", root),
+        lambda place: ("generate", place.recipe(), "--out", (root := place.dataset()), "--reuse", root),
         "is the dataset that is to be made; give the folder of another one",
     ),
     "regime on the command line": (
@@ -136,8 +136,8 @@ FILES = {
         lambda place: ("detect", _mixed(place.dataset(without=["detections"]))),
         "belongs to another recipe; delete it",
     ),
-    "truncated master": (damaged("masters", half, "verify"), "cannot be read as a master"),
-    "garbage master": (damaged("masters", garbage, "verify"), "cannot be read as a master"),
+    "truncated master": (damaged("masters", half, "verify"), "cannot be read as a linear image"),
+    "garbage master": (damaged("masters", garbage, "verify"), "cannot be read as a linear image"),
     "missing master": (damaged("masters", gone, "verify"), "is missing; run the generate stage"),
     "image is no PNG": (not_a_png("detect"), "the image is not an 8-bit grey PNG"),
     "image is no PNG, verify": (not_a_png("verify"), "the image is not an 8-bit grey PNG"),

@@ -5,12 +5,11 @@ import pytest
 from scipy.optimize import approx_fprime
 
 from eposit import Camera, solve
-from eposit.pose import rotation_error_rad, rotation_from_vector
-from eposit.posit.iteration import Start
-from eposit.rays import inside_rim, unit_rays
+from eposit.pose import PoseBatch, rotation_error_rad, rotation_from_vector
+from eposit.rays import onto_image_circle, unit_rays
 from eposit.refine import ldl6
 from eposit.refine.minimise import descend
-from eposit.refine.reprojection import View, cost, equations, gradient, residuals
+from eposit.refine.reprojection import Observations, cost, equations, gradient, residuals
 from eposit.refine.weights import refine_poses, whitening
 from eposit.shape import Shape
 from eposit.starts import other_starts
@@ -43,7 +42,7 @@ def test_equations_are_those_of_numerical_derivatives(camera, sigma):
     points, R, t, pixels = scene(camera, 3)
     covariances = None if sigma is None else np.broadcast_to([[0.3, 0.1], [0.1, 0.2]], (5, 2, 2))
     weights = whitening(covariances, 5)
-    view = View.of(camera, points, pixels, weights)
+    view = Observations.of(camera, points, pixels, weights)
     model = equations(view, *columns(R, t))
     np.testing.assert_allclose(gradient(view, *columns(R, t)), model.gradient, rtol=1e-9, atol=1e-7)
     for i in range(len(t)):
@@ -109,7 +108,7 @@ def test_steps_with_one_matrix_end_where_steps_with_their_own_do():
     weights, u, v = whitening(None, 6), pixels[..., 0].T, pixels[..., 1].T
     ours = refine_poses(camera, points, u, v, R, t, weights)
     assert ours.converged.all()
-    view = View.of(camera, points, pixels, weights)
+    view = Observations.of(camera, points, pixels, weights)
     turn, place = columns(R, t)
     for _ in range(30):  # plain Gauss-Newton, LAPACK's solver, SciPy's rotations
         model = equations(view, turn, place)
@@ -119,7 +118,7 @@ def test_steps_with_one_matrix_end_where_steps_with_their_own_do():
         turn, place = columns(rotation_from_vector(move[:, :3]) @ turn.transpose(2, 0, 1), place.T + move[:, 3:])
     np.testing.assert_allclose(ours.R, turn.transpose(2, 0, 1), atol=1e-11)  # the tolerance of the last step
     np.testing.assert_allclose(ours.t, place.T, rtol=1e-11)
-    start = Start(*columns(R, t), np.zeros(60, np.int64), np.ones(60, bool))
+    start = PoseBatch(*columns(R, t), np.zeros(60, np.int64), np.ones(60, bool))
     exact = ldl6.inverse(ldl6.factorise(equations(view, turn, place).normal))
     found = descend(view, start).spread
     scale = np.sqrt(np.einsum("iib->ib", exact))
@@ -136,12 +135,12 @@ def test_a_pose_that_counts_as_sure_is_the_best_of_all_starts(noise):
             for obj in (None, PAPER_OBJECT):
                 camera = paper_camera(lens)
                 points, _, _, pixels = scene(camera, 200, 4, noise, ratio, obj)
-                shape, every = Shape.of(points), View.of(camera, points, pixels, whitening(None, 4))
-                rays = unit_rays(camera, inside_rim(camera, every.seen))
+                shape, every = Shape.of(points), Observations.of(camera, points, pixels, whitening(None, 4))
+                rays = unit_rays(camera, onto_image_circle(camera, every.seen))
                 found = solve(points, pixels, camera).cam_from_obj
                 R, t = columns(found.R, found.t)
                 good = np.flatnonzero(shape.sure(R, t, ray_misfit(points, rays, R, t)))
-                view = View.of(camera, points, pixels[good], whitening(None, 4))
+                view = Observations.of(camera, points, pixels[good], whitening(None, 4))
                 lowest = cost(residuals(view, R[..., good], t[:, good]))
                 for start in other_starts(shape, rays[..., good]):
                     other = descend(view, start)

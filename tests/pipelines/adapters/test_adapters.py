@@ -129,8 +129,8 @@ def wide_image(theta_deg):
 def test_where_a_pinhole_has_no_image_is_a_status(name):
     for theta_deg, status in (
         (89.0, "ok"),
-        (90.0 + 1e-9, "field_angle"),
-        (100.0, "field_angle"),
+        (90.0 + 1e-9, "beyond_90_degrees"),
+        (100.0, "beyond_90_degrees"),
         (181.0, "outside_lens"),
     ):
         found = find_solver(name)(*wide_image(theta_deg))
@@ -151,7 +151,7 @@ def test_too_few_points_are_a_status(name, n):
 def test_a_lens_that_opencv_has_no_model_of_is_a_status(lens):
     camera, points = paper_camera(lens), random_object(np.random.default_rng(4), 6)
     found = find_solver("opencv-fisheye")(points, camera.project(helix_pose(0.0).apply(points)), camera)
-    assert found.status == "lens_not_taken"
+    assert found.status == "unsupported_lens"
 
 
 @pytest.mark.parametrize("name", ADAPTERS)

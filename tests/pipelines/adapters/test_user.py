@@ -42,7 +42,7 @@ def rows(root, table, variant):
 
 
 def outcome(result):
-    """Answer to one result, and what was told."""
+    """PoseResult to one result, and what was told."""
     notes = []
     return attempt(lambda: result, "--solver own:solve", notes.append), notes
 
@@ -240,7 +240,7 @@ def test_a_changed_function_is_run_again_when_asked(own, root, cli):
     sys.modules.pop(name)
     assert cli(*words).code == 0
     assert {row["status"] for row in rows(root, "estimates", f"{name}@solve-detected-exact-all")} == {"no_solution"}
-    assert cli(*words, "--again").code == 0
+    assert cli(*words, "--overwrite").code == 0
     assert {row["status"] for row in rows(root, "estimates", f"{name}@solve-detected-exact-all")} == {"ok"}
     assert rows(root, "scores", f"{name}@solve-detected-exact-all") == []
     assert cli("score", root, "-q").code == 0

@@ -14,7 +14,7 @@ from datasets.store.dataset import open_dataset
 from pipelines.detection import Detector, detect_points
 from pipelines.detection.board_map import BoardMap, grid
 from pipelines.detection.corners import refine_corners
-from render.frame import render_master
+from render.frame import render_frame
 from render.sensor.develop import develop
 
 RECIPE, _ = load_recipe("demo")
@@ -29,7 +29,7 @@ def demo():
     found = []
     for frame in plan(RECIPE):
         camera = frame.camera.true_camera()
-        master = render_master(TARGET, RECIPE.light, camera, frame.cam_from_obj, samples=RECIPE.sample_count())
+        master = render_frame(TARGET, RECIPE.light, camera, frame.cam_from_obj, samples=RECIPE.sample_count())
         image = develop(master.full(camera), RECIPE.sensor)
         found.append((frame, image, camera.project(frame.cam_from_obj.apply(TARGET.points))))
     return found
@@ -221,5 +221,5 @@ def test_detectors_lie_side_by_side_in_one_dataset(tiny, tmp_path, cli, content)
     assert np.nanmax(np.abs(ours - theirs)) > 1e-3
     # An estimate says whose points it took, in its rows and its shards.
     (path,) = (root / "scores").glob("best-detected-opencv-subpix-exact-all-00000-of-*")
-    assert set(pq.read_table(path)["points"].to_pylist()) == {"detected-opencv-subpix"}
+    assert set(pq.read_table(path)["point_source"].to_pylist()) == {"detected-opencv-subpix"}
     assert cli("detect", root, "--detector", Detector.OPENCV_SB).out.startswith("detect opencv-sb: all 2 shards")

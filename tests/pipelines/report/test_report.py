@@ -35,7 +35,7 @@ def test_failures_are_counted_and_kept_out_of_medians(tiny):
     assert sum(row["n"] for row in rows) == scores.num_rows
     for item in found:
         assert np.isnan(item.errors["rotation_error_deg"][item.failed]).all()
-        assert np.all(item.star[item.failed])
+        assert np.all(item.gross[item.failed])
     for row in rows:
         for score in row["rotation_error_deg"] or ():
             assert score.low <= score.value <= score.high

@@ -34,7 +34,14 @@ def test_the_readmes_estimator_comes_out_in_tables_and_report(own, root, cli, co
     made, scores = image_rows(root, "estimates", name), image_rows(root, "scores", name)
     assert [row["frame_id"] for row in made] == [0, 1]
     for row, score in zip(made, scores, strict=True):
-        key = {"solver": name, "points": "image", "camera": "exact", "use": "all", "draw": 0, "status": "ok"}
+        key = {
+            "solver": name,
+            "point_source": "image",
+            "assumed_camera": "exact",
+            "point_set": "all",
+            "noise_draw": 0,
+            "status": "ok",
+        }
         assert key.items() <= row.items()
         assert key.items() <= score.items()
         assert row["n_points"] == 0
@@ -50,7 +57,7 @@ def test_the_readmes_estimator_comes_out_in_tables_and_report(own, root, cli, co
     before, digest = files(root), content(root)
     assert cli("estimate", root, "--estimator", name, "-q").code == 0
     assert {path: data for path, (_, data) in before.items()} == {path: data for path, (_, data) in files(root).items()}
-    assert cli("estimate", root, "--estimator", name, "-q", "--again", "--workers", 2).code == 0
+    assert cli("estimate", root, "--estimator", name, "-q", "--overwrite", "--workers", 2).code == 0
     assert image_rows(root, "scores", name) == []
     assert cli("score", root, "-q").code == 0
     assert content(root) == digest
@@ -73,7 +80,7 @@ def test_what_a_system_is_given(camera, fx, cx, own, root, cli):
     name = f"{own(SEES)}:estimate"
     assert cli("estimate", root, "--estimator", name, "--camera", camera, "-q").code == 0
     for row in image_rows(root, "estimates", name, camera):
-        assert (row["camera"], row["status"]) == (camera, "ok")
+        assert (row["assumed_camera"], row["status"]) == (camera, "ok")
         assert (row["t_x_mm"], row["t_y_mm"], row["t_z_mm"]) == (fx, cx, 100.0)
 
 
@@ -113,7 +120,7 @@ def test_failures_of_a_system_are_rows(own, root, cli):
     assert cli("report", root).code == 0
     assert [row["status"] for row in image_rows(root, "scores", f"{name}:estimate")] == ["too dark", "solver_error"]
     never = image_rows(root, "scores", f"{name}:never")
-    assert [(row["status"], row["star"]) for row in never] == [("no_solution", True)] * 2
+    assert [(row["status"], row["gross_failure"]) for row in never] == [("no_solution", True)] * 2
     cells = rf"<td>{name}:never image exact all</td><td>pinhole</td><td>2</td>"
     assert re.search(rf'{cells}<td><span class="bad">2</span>.*\s*<td>2<br>', (root / REPORT).read_text())
 

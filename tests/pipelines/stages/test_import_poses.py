@@ -66,7 +66,14 @@ def test_poses_of_a_file_are_scored(suffix, form, poses, root, tmp_path, cli):
     rows, scores = made(root, "estimates"), made(root, "scores")
     assert [row["frame_id"] for row in rows] == [0, 1]
     for row, score, pose in zip(rows, scores, poses, strict=True):
-        key = {"solver": "theirs", "points": "image", "camera": "exact", "use": "all", "draw": 0, "status": "ok"}
+        key = {
+            "solver": "theirs",
+            "point_source": "image",
+            "assumed_camera": "exact",
+            "point_set": "all",
+            "noise_draw": 0,
+            "status": "ok",
+        }
         assert key.items() <= row.items()
         assert key.items() <= score.items()
         # Text and matrices keep 1e-16; the sign of a quaternion is free.
@@ -112,7 +119,7 @@ def test_missing_rows_and_empty_poses_are_failures(poses, root, tmp_path, cli):
     assert done.code == 0
     assert "has no pose for 1 of 2 frames; they count as failures" in done.out
     scores = made(root, "scores")
-    assert [(row["status"], row["star"]) for row in scores] == [("missing", True), ("ok", False)]
+    assert [(row["status"], row["gross_failure"]) for row in scores] == [("missing", True), ("ok", False)]
     assert np.isnan(scores[0]["rotation_error_deg"])
     empty = dict.fromkeys((*Q, *T), "")
     assert (

@@ -35,7 +35,7 @@ def no_rendering(monkeypatch):
     def refuse(*_, **__):
         raise AssertionError("rendered again")
 
-    monkeypatch.setattr(generate, "render_master", refuse)
+    monkeypatch.setattr(generate, "render_frame", refuse)
 
 
 def first(root, folder):
@@ -163,8 +163,8 @@ def test_a_noisy_regime_needs_no_rendering_and_has_the_same_bits_in_any_order(ti
     recipe, _ = copy
     noisy = tmp_path / "noisy"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(generate, "render_master", lambda *_, **__: pytest.fail("rendered again"))
-        done = cli("generate", recipe, "--out", noisy, "--regime", "harsh", "--masters", tiny[1])
+        patch.setattr(generate, "render_frame", lambda *_, **__: pytest.fail("rendered again"))
+        done = cli("generate", recipe, "--out", noisy, "--regime", "harsh", "--reuse", tiny[1])
     assert done.code == 0
     assert "2 of 2 taken from" in done.out.replace("\n", " ")
     before = content(noisy)
@@ -183,7 +183,7 @@ def test_only_masters_of_the_same_views_are_taken(tiny, copy, tmp_path, cli, con
     lost, kept = sorted((root / "masters").iterdir())
     lost.write_bytes(kept.read_bytes())  # a whole master, of another frame
     recipe.write_text(tiny[0].replace("stop = 90", "stop = 180"))  # one view more
-    done = cli("generate", recipe, "--out", tmp_path / "more", "--masters", root)
+    done = cli("generate", recipe, "--out", tmp_path / "more", "--reuse", root)
     assert done.code == 0
     assert "1 of 3 taken from" in done.out.replace("\n", " ")
     assert cli("generate", recipe, "--out", tmp_path / "alone").code == 0
@@ -195,5 +195,5 @@ def test_masters_are_copied_where_no_link_is_possible(tiny, copy, tmp_path, cli,
         raise OSError(errno.EXDEV, "another disk")
 
     monkeypatch.setattr("os.link", refuse)
-    assert cli("generate", copy[0], "--out", tmp_path / "other", "--masters", tiny[1], "--regime", "typical").code == 0
+    assert cli("generate", copy[0], "--out", tmp_path / "other", "--reuse", tiny[1], "--regime", "typical").code == 0
     assert {path.stat().st_nlink for path in (tmp_path / "other" / "masters").iterdir()} == {1}

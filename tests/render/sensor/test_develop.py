@@ -9,9 +9,9 @@ from scipy.stats import kstest, norm
 
 from eposit import Camera, Pose
 from eposit.pose import rotation_from_euler
-from render.frame import render_master
+from render.frame import render_frame
 from render.light import Light
-from render.sensor.develop import LEAST_MOTION_PX, SHORT_PX, Shot, develop
+from render.sensor.develop import LEAST_MOTION_PX, SHORT_PX, FrameContext, develop
 from render.sensor.motion import Rate, at_pixels, way_at_nodes
 from render.sensor.noise import normals
 from render.sensor.optics import disc_kernel, vignetting_gain
@@ -27,7 +27,7 @@ BARE = SensorModel(exposure=1.0, psf_sigma_px=0.0)
 
 
 def shot(seed=0, rate=STILL, pose=FACING, camera=CAMERA, region=WHOLE):
-    return Shot(TARGET, camera, pose, rate, region, seed)
+    return FrameContext(TARGET, camera, pose, rate, region, seed)
 
 
 def flat(value):
@@ -205,7 +205,7 @@ def test_the_blur_is_the_mean_of_renders_on_the_way():
     moments = (np.arange(16) + 0.5) / 16.0 - 0.5
 
     def light(at, samples):
-        return render_master(TARGET, Light(), camera, at, samples=samples, seed=1).full(camera)
+        return render_frame(TARGET, Light(), camera, at, samples=samples, seed=1).full(camera)
 
     mean = np.mean([light(rate.moved(pose, s * 0.04), 64) for s in moments], axis=0, dtype=np.float64)
     expected = develop(mean.astype(np.float32), SensorModel()).astype(float)

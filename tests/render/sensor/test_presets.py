@@ -5,8 +5,8 @@ import numpy as np
 
 from datasets.plan import plan
 from datasets.recipe.model import load_recipe
-from render.frame import render_master
-from render.sensor.develop import Shot, develop
+from render.frame import render_frame
+from render.sensor.develop import FrameContext, develop
 from render.sensor.presets import regimes
 
 DRAWS = 4
@@ -28,10 +28,10 @@ def test_opencv_scatters_by_0_40_px_in_the_regime_paper():
     for frame in chosen:
         camera = frame.camera.true_camera()
         truth = camera.project(frame.cam_from_obj.apply(target.corners))
-        master = render_master(target, recipe.light, camera, frame.cam_from_obj, samples=16, seed=frame.render_seed)
+        master = render_frame(target, recipe.light, camera, frame.cam_from_obj, samples=16, seed=frame.render_seed)
         light = master.full(camera)
         for draw in range(DRAWS):
-            seen = Shot(target, camera, frame.cam_from_obj, frame.rate, master.region, frame.sensor_seed + draw)
+            seen = FrameContext(target, camera, frame.cam_from_obj, frame.rate, master.region, frame.sensor_seed + draw)
             x, y, width, height = master.region
             image = np.ascontiguousarray(develop(light, model, seen)[y : y + height, x : x + width])
             found, tried = opencv_corners(image, target.inner), tried + 1
