@@ -11,13 +11,23 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
-from numpy.typing import NDArray
 
 from eposit.arrays import Array, Mask
 from pipelines.detection.board_map import BoardMap
-from pipelines.detection.circle_model import CONTRAST_FROM, CONTRAST_TO, SIZE, SOFTNESS, fit_disc
+from pipelines.detection.circle_model import (
+    BLOCKED,
+    DISC_GREY,
+    LAMP,
+    SHADOW,
+    SIZE,
+    SOFTNESS,
+    WHITE_GREY,
+    Patch,
+    Prior,
+    fit_disc,
+)
 from pipelines.detection.finders import Grey
+from pipelines.detection.kernels import ordered
 from render.targets.chessboard import Target
 from render.targets.disc_shade import blocked_share
 
@@ -26,7 +36,6 @@ LARGE_PX = 45  # side of a patch from which the blur is well sampled by the coar
 CLEAR_BLURS = 3.0  # blurs between a pixel and the next black square
 BAND_PX = 1.5  # pixels of the board around the circle, beyond that
 LEAST_PIXELS = 40
-STEPS, STOP = 60, 0.5  # step, in standard deviations, at which a fit has converged; it is still made
 START_SHADOW = (0.18, 0.18, 0.18)  # place and softness, in heights of the circle above the board
 SIZE_SPREAD = 0.003  # the board's map gives the size to this: nearer or farther it looks the same to five in a thousand
 SHADOW_SPREAD, SOFTNESS_MEAN, SOFTNESS_SPREAD = 0.9, 0.15, 0.15  # heights
@@ -45,19 +54,6 @@ class Circle:
     covariance_px2: Array  # (2, 2)
 
 
-@dataclass(frozen=True, slots=True)
-class _Patch:
-    """A part of the image around the circle, and the fine grid over it in radii of the circle."""
-
-    grey: Array  # (n,) pixels that take part
-    rows: NDArray[np.intp]  # (n,)
-    columns: NDArray[np.intp]  # (n,)
-    on_board: Array  # (2, h, w) from the circle's foot
-    on_disc: Array  # (2, h, w) from its centre, on its plane
-    fields: Array  # (3, h, w) for `fit_disc`
-    finer: int
-
-
 def find_circle(image: Grey, board: BoardMap, blur_px: float, contrast: float, target: Target) -> Circle | None:
     """The circle's centre, or None if there is no dark disc where the board puts it.
 
@@ -71,22 +67,16 @@ def find_circle(image: Grey, board: BoardMap, blur_px: float, contrast: float, t
     patch = _patch(image, board, centre, jacobian, blur_px, target)
     if patch is None:
         return None
-    per_px = np.linalg.inv(jacobian) / radius
-    start, expected, spread = _beforehand(contrast, target.circle_height_mm / target.circle_radius_mm)
-    fitted, covariance, _, converged = fit_disc(
-        patch.grey, patch.rows, patch.columns, patch.on_board, patch.on_disc, patch.fields, per_px,
-        _kernel(blur_px, patch.finer), patch.finer, start, expected, spread,
-        FURTHEST_SHADOW * target.circle_height_mm / target.circle_radius_mm, STEPS, STOP,
-    )  # fmt: skip
-    shift = fitted[:2]
-    found = converged and np.linalg.norm(shift) * radius < SEARCH_SHARE and abs(fitted[SIZE] - 1.0) < SIZE_LIMIT
-    if not found or fitted[CONTRAST_FROM] - fitted[CONTRAST_TO] < LEAST_CONTRAST * contrast:
+    fit = fit_disc(patch, _beforehand(contrast, target.circle_height_mm / target.circle_radius_mm))
+    shift = fit.values[:2]
+    found = fit.converged and np.linalg.norm(shift) * radius < SEARCH_SHARE and abs(fit.values[SIZE] - 1.0) < SIZE_LIMIT
+    if not found or fit.values[WHITE_GREY] - fit.values[DISC_GREY] < LEAST_CONTRAST * contrast:
         return None
     to_px = jacobian * radius
-    return Circle(centre + to_px @ shift, to_px @ covariance[:2, :2] @ to_px.T)
+    return Circle(centre + to_px @ shift, to_px @ fit.covariance[:2, :2] @ to_px.T)
 
 
-def _beforehand(contrast: float, height: float) -> tuple[Array, Array, Array]:
+def _beforehand(contrast: float, height: float) -> Prior:
     """PoseBatch of the shape, and mean and spread of all that `fit_disc` fits; what is not known has a wide spread.
 
     height: of the circle above the board, radii.
@@ -94,12 +84,12 @@ def _beforehand(contrast: float, height: float) -> tuple[Array, Array, Array]:
     start = np.array([0.0, 0.0, 1.0, *(height * share for share in START_SHADOW)])
     expected, spread = np.zeros(12), np.full(12, 1e6)
     expected[SIZE], spread[SIZE] = 1.0, SIZE_SPREAD
-    spread[3:5] = height * SHADOW_SPREAD
+    spread[SHADOW] = height * SHADOW_SPREAD
     expected[SOFTNESS], spread[SOFTNESS] = height * SOFTNESS_MEAN, height * SOFTNESS_SPREAD
-    spread[8:10] = 0.5 * contrast
-    expected[10], spread[10] = 0.3 * contrast, 0.3 * contrast
-    expected[11], spread[11] = 0.6 * contrast, 0.6 * contrast
-    return start, expected, spread
+    spread[WHITE_GREY + 1 : BLOCKED] = 0.5 * contrast
+    expected[BLOCKED], spread[BLOCKED] = 0.3 * contrast, 0.3 * contrast
+    expected[LAMP], spread[LAMP] = 0.6 * contrast, 0.6 * contrast
+    return Prior(start, expected, spread, FURTHEST_SHADOW * height)
 
 
 def _kernel(blur_px: float, finer: int) -> Array:
@@ -112,7 +102,7 @@ def _kernel(blur_px: float, finer: int) -> Array:
 
 def _patch(
     image: Grey, board: BoardMap, centre: Array, jacobian: Array, blur_px: float, target: Target
-) -> _Patch | None:
+) -> Patch | None:
     """The pixels around the circle that see it or its white square; None if it reaches out of the image."""
     at, height = target.circle_centre[:2] / target.square_mm, target.circle_height_mm / target.square_mm
     radius = target.circle_radius_mm / target.square_mm
@@ -127,23 +117,32 @@ def _patch(
     planes = board.meet_planes(fine_x, fine_y, np.array([0.0, height]))
     on_board, on_disc = (planes - at[:, None, None]) / radius
     size = np.sqrt(abs(np.linalg.det(jacobian))) * radius
-    slopes = np.meshgrid((fine_x - centre[0]) / size, (fine_y - centre[1]) / size)
     blocked = blocked_share(np.hypot(*on_board), 1.0, height / radius)
     shape = (high[1] - low[1], finer, high[0] - low[0], finer)
     squares = (planes[0].reshape(2, *shape)).mean(axis=(2, 4))
-    margin, white = (
-        CLEAR_BLURS * blur_px * np.linalg.norm(np.linalg.inv(jacobian), axis=1),
-        np.empty(squares[0].shape, bool),
-    )
+    margin = CLEAR_BLURS * blur_px * np.linalg.norm(np.linalg.inv(jacobian), axis=1)
+    white = np.empty(squares[0].shape, bool)
     _on_white(squares[0], squares[1], margin, target.columns, target.rows, target.margin_squares, white)
-    rows, columns = np.nonzero(white)
+    rows, columns = map(np.ascontiguousarray, np.nonzero(white))
     if len(rows) < LEAST_PIXELS:
         return None
     grey = image[low[1] : high[1], low[0] : high[0]].astype(np.float64)[rows, columns]
-    return _Patch(grey, rows, columns, on_board, on_disc, np.stack((*slopes, blocked)), finer)
+    return Patch(
+        grey=grey,
+        rows=rows,
+        columns=columns,
+        on_board=on_board,
+        on_disc=on_disc,
+        slope_x=(fine_x - centre[0])[None] / size,
+        slope_y=(fine_y - centre[1])[:, None] / size,
+        blocked=blocked,
+        per_px=np.linalg.inv(jacobian) / radius,
+        kernel=_kernel(blur_px, finer),
+        finer=finer,
+    )
 
 
-@njit(cache=True)
+@ordered
 def _on_white(x: Array, y: Array, margin: Array, columns: int, rows: int, border: float, out: Mask) -> None:
     """Which board coordinates x, y (h, w) lie on white and `margin` (2,) squares away from black and the border."""
     for i in range(out.shape[0]):
@@ -156,3 +155,8 @@ def _on_white(x: Array, y: Array, margin: Array, columns: int, rows: int, border
                 black = 0 <= column < columns and 0 <= row < rows and (column + row) % 2 == 0
                 if black or not inside:
                     out[i, j] = False
+
+
+def prepare() -> None:
+    """Call the compiled function once."""
+    _on_white(np.zeros((0, 0)), np.zeros((0, 0)), np.zeros(2), 4, 4, 1.0, np.zeros((0, 0), bool))

@@ -1,4 +1,4 @@
-"""Compiled least squares of the raised circle: a dark disc over a board on which it casts its shade.
+"""Least squares of the raised circle: a dark disc over a board on which it casts its shade.
 
 On a grid finer than the pixels, the picture is k D + (1 - D) (w + g . x - A b - L s): the disc D with grey k over
 white w with a slope g, of which the disc blocks a share b of the surroundings' light, and the lamp's shadow s, a disc
@@ -11,30 +11,83 @@ Where the disc's rim lies in its own shade, no edge can be seen; the model knows
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from eposit.arrays import Array
-from pipelines.detection.erf import GAUSS, REORDER, decay, signed_share
+from pipelines.detection.erf import GAUSS, decay, signed_share
+from pipelines.detection.kernels import reordered
 
 Places = NDArray[np.intp]
 # Numbers of a fit, in order: disc x, y, in radii from where it is expected, and its size as a ratio; shadow x, y from
 # the foot and the softness of its rim, in radii; then k, w, gx, gy (per radius), A, L in grey values.
 SHAPE, LINEAR = 6, 6
-SIZE, SOFTNESS, CONTRAST_FROM, CONTRAST_TO = 2, 5, 7, 6
+SIZE, SHADOW, SOFTNESS = 2, slice(3, 5), 5
+DISC_GREY, WHITE_GREY, BLOCKED, LAMP = 6, 7, 10, 11
 FURTHEST_STEP = np.array([0.15, 0.15, 0.02, 0.15, 0.15, 0.05])  # in one iteration
 SOFTNESS_LIMITS = (0.01, 0.6)
 ROUNDING = 1.0 / 12.0  # variance of a grey value that was rounded: no picture is better known
+STEPS = 60
+STOP = 0.5  # step, in standard deviations of what is fitted, at which a fit has converged; it is still made
 
 
-@njit(cache=True, fastmath=REORDER, error_model="numpy")
-def _open_share(v: Array, p: Array, per_px: Array, finer: int, out: Array, slopes: Array) -> None:
+@dataclass(frozen=True, slots=True)
+class Patch:
+    """A part of the image around the circle, and the fine grid over it in radii of the circle."""
+
+    grey: Array  # (n,) grey values of the pixels that take part
+    rows: Places  # (n,) of these pixels
+    columns: Places  # (n,)
+    on_board: Array  # (2, h, w) places of the fine grid on the board, from the circle's foot
+    on_disc: Array  # (2, h, w) places on the circle's plane, from its centre
+    slope_x: Array  # (1, w) the white's slope along x for a slope of one grey value per radius
+    slope_y: Array  # (h, 1) likewise along y
+    blocked: Array  # (h, w) share of the surroundings' light that the disc blocks
+    per_px: Array  # (2, 2) radii per px
+    kernel: Array  # (k,) taps of the blur on the fine grid
+    finer: int  # cells of the fine grid to a pixel, along each side
+
+
+@dataclass(frozen=True, slots=True)
+class Prior:
+    """What is known before the pixels are looked at."""
+
+    start: Array  # (6,) shape to start from
+    mean: Array  # (12,)
+    spread: Array  # (12,) standard deviations
+    furthest_shadow: float  # radii
+
+
+@dataclass(frozen=True, slots=True)
+class DiscFit:
+    """The fit of one disc."""
+
+    values: Array  # (12,)
+    covariance: Array  # (12, 12)
+    converged: bool
+
+
+@dataclass(frozen=True, slots=True)
+class _Picture:
+    """The model's picture at one shape: what is linear in it, and what moves."""
+
+    opened: Array  # (h, w) share of a fine cell that the disc leaves open
+    shade: Array  # (h, w) share of the lamp that is hidden
+    basis: Array  # (n, 6) pixels for a change of the linear numbers
+    rim: Array  # (3, h, w) change of `opened` with the disc's x, y and size
+    edge: Array  # (3, h, w) change of `shade` with its x, y and softness
+
+
+@reordered
+def _open_share(v: Array, p: Array, per_px: Array, finer: int) -> tuple[Array, Array]:
     """Share of each fine cell that the disc leaves open, and its change with the disc's x, y and size (3, h, w).
 
     v: (2, h, w) places on its plane, radii from its centre.
     """
+    _, height, width = v.shape
+    out, slopes = np.empty((height, width)), np.empty((3, height, width))
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
             a, b = v[0, i, j] - p[0], v[1, i, j] - p[1]
@@ -43,17 +96,21 @@ def _open_share(v: Array, p: Array, per_px: Array, finer: int, out: Array, slope
             down = (per_px[0, 1] * a + per_px[1, 1] * b) / radius
             per_radius = finer / math.sqrt(across * across + down * down)  # fine cells
             beyond = (radius - p[2]) * per_radius
-            out[i, j] = min(max(0.5 + beyond, 0.0), 1.0)
-            slope = -per_radius if abs(beyond) < 0.5 else 0.0
+            inside = -0.5 < beyond < 0.5
+            out[i, j] = 0.5 + beyond if inside else 0.0 if beyond < 0.0 else 1.0
+            slope = -per_radius if inside else 0.0
             slopes[0, i, j], slopes[1, i, j], slopes[2, i, j] = slope * a / radius, slope * b / radius, slope
+    return out, slopes
 
 
-@njit(cache=True, fastmath=REORDER, error_model="numpy")
-def _shadow(u: Array, p: Array, out: Array, slopes: Array) -> None:
+@reordered
+def _shadow(u: Array, p: Array) -> tuple[Array, Array]:
     """Share of the lamp that is hidden, and its change with the shadow's x, y and softness (3, h, w).
 
     u: (2, h, w) places on the board, radii from the disc's foot.
     """
+    _, height, width = u.shape
+    out, slopes = np.empty((height, width)), np.empty((3, height, width))
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
             a, b = u[0, i, j] - p[3], u[1, i, j] - p[4]
@@ -63,120 +120,115 @@ def _shadow(u: Array, p: Array, out: Array, slopes: Array) -> None:
             out[i, j] = 0.5 - 0.5 * signed_share(beyond, bell)
             slope = 0.5 * GAUSS * bell / p[5]
             slopes[0, i, j], slopes[1, i, j], slopes[2, i, j] = slope * a / radius, slope * b / radius, slope * beyond
+    return out, slopes
 
 
-@njit(cache=True, fastmath=REORDER)
-def _blurred(fine: Array, kernel: Array, finer: int, rows: Places, columns: Places, held: Array, out: Array) -> None:
-    """Separable blur of a fine grid, sampled at the pixels (n,), (n,) of the patch into `out` (n,).
-
-    held: (pixels along y, width of the grid and twice as many cells as the kernel has taps).
-    """
-    taps, width = len(kernel), fine.shape[1]
+@reordered
+def _blurred(fine: Array, kernel: Array, finer: int, rows: Places, columns: Places) -> Array:
+    """Separable blur of a fine grid (h, w), at the pixels (n,), (n,) of the patch. Beyond its border the grid goes on
+    as it ends."""
+    taps, (height, width) = len(kernel), fine.shape
     first = (finer - taps) // 2
+    held = np.empty((height // finer, width + 2 * taps))
     for i in range(held.shape[0]):
-        line = held[i, taps : taps + width]
-        line[:] = 0.0
+        for j in range(width):
+            held[i, taps + j] = 0.0
         for k in range(taps):
-            cells = fine[min(max(finer * i + first + k, 0), fine.shape[0] - 1)]
+            row = finer * i + first + k
+            row = 0 if row < 0 else height - 1 if row >= height else row
             for j in range(width):
-                line[j] += kernel[k] * cells[j]
-        held[i, :taps], held[i, taps + width :] = line[0], line[-1]  # the grid goes on as it ends
-    for n in range(len(out)):
+                held[i, taps + j] += kernel[k] * fine[row, j]
+        for j in range(taps):
+            held[i, j], held[i, taps + width + j] = held[i, taps], held[i, taps + width - 1]
+    out = np.empty(len(rows))
+    for n in range(len(rows)):
         begin, total = finer * columns[n] + first + taps, 0.0
-        cells = held[rows[n], begin : begin + taps]
         for k in range(taps):
-            total += kernel[k] * cells[k]
+            total += kernel[k] * held[rows[n], begin + k]
         out[n] = total
+    return out
 
 
-@njit(cache=True)
-def fit_disc(
-    grey: Array,
-    rows: Places,
-    columns: Places,
-    u: Array,
-    v: Array,
-    fields: Array,
-    per_px: Array,
-    kernel: Array,
-    finer: int,
-    start: Array,
-    expected: Array,
-    spread: Array,
-    furthest: float,
-    steps: int,
-    stop: float,
-) -> tuple[Array, Array, float, bool]:
-    """Fit one disc.
+def fit_disc(patch: Patch, prior: Prior) -> DiscFit:
+    """Fit one disc by Levenberg and Marquardt; the linear numbers are the best ones at each shape.
 
-    grey: (n,) values of the pixels at rows, columns (n,) of the patch. u, v: (2, h, w) places of the fine grid on the
-    board and on the disc's plane, in radii. fields: (3, h, w) slopes x, y in radii and the blocked share. per_px:
-    (2, 2) radii per px. kernel: (k,) taps of the blur on the fine grid, `finer` cells to a pixel. start: (6,) shape.
-    expected, spread: (12,) what is known beforehand, as mean and standard deviation. furthest: of the shadow, radii.
-    stop: step, in standard deviations of what is fitted, at which it has converged.
-
-    Returns:
-        (12,) the fit, (12, 12) covariance, standard deviation of the residuals where they tell the place, convergence.
+    The loop is NumPy's, and what takes time is compiled, one function a task: a picture has one circle, and Numba
+    would need seconds for the loop.
     """
-    total, n, fine = SHAPE + LINEAR, len(grey), fields.shape[1:]
-    opened, shade, under, product = np.empty(fine), np.empty(fine), np.empty(fine), np.empty(fine)
-    rim, edge = np.empty((3, *fine)), np.empty((3, *fine))  # changes of the disc and of its shadow
-    held, column = np.empty((fine[0] // finer, fine[1] + 2 * len(kernel))), np.empty(n)
-    basis, jacobian = np.empty((n, LINEAR)), np.empty((n, total))
-    p, trial = np.zeros(total), np.zeros(total)
-    trial[:SHAPE] = start
-    normal, right = np.eye(total), np.zeros(total)
-    cost, damping, noise, converged = -1.0, 1e-3, 4.0, False
-    for _ in range(steps):
-        _open_share(v, trial, per_px, finer, opened, rim)
-        _shadow(u, trial, shade, edge)
-        _blurred(opened, kernel, finer, rows, columns, held, column)
-        basis[:, 0], basis[:, 1] = 1.0 - column, column
-        for k in range(4):
-            if k < 2:
-                product[:] = opened * fields[k]
-            else:
-                product[:] = -opened * (fields[2] if k == 2 else shade)
-            _blurred(product, kernel, finer, rows, columns, held, column)
-            basis[:, 2 + k] = column
-        weigh = noise / spread**2
-        square, side = basis.T @ basis, basis.T @ grey
-        for k in range(LINEAR):
-            square[k, k] += weigh[SHAPE + k] + 1e-9 * square[k, k]
-            side[k] += weigh[SHAPE + k] * expected[SHAPE + k]
-        trial[SHAPE:] = np.linalg.solve(square, side)
-        residual = grey - basis @ trial[SHAPE:]
-        new = np.dot(residual, residual) + np.sum(weigh * (trial - expected) ** 2)
-        if cost >= 0.0 and new > cost:
+    values, trial = np.zeros(SHAPE + LINEAR), np.zeros(SHAPE + LINEAR)
+    trial[:SHAPE] = prior.start
+    normal, right = np.eye(len(values)), np.zeros(len(values))
+    cost, damping, noise = np.inf, 1e-3, 4.0
+    for _ in range(STEPS):
+        picture = _draw(patch, trial)
+        weigh = noise / prior.spread**2
+        trial[SHAPE:] = _best_levels(picture.basis, patch.grey, weigh[SHAPE:], prior.mean[SHAPE:])
+        residual = patch.grey - picture.basis @ trial[SHAPE:]
+        if residual @ residual + np.sum(weigh * (trial - prior.mean) ** 2) > cost:
             damping *= 10.0
         else:
-            p[:] = trial
-            damping = max(0.1 * damping, 1e-9)
-            under[:] = p[7] - p[6] + p[8] * fields[0] + p[9] * fields[1] - p[10] * fields[2] - p[11] * shade
-            for k in range(SHAPE):
-                product[:] = rim[k] * under if k < 3 else edge[k - 3] * opened * -p[11]
-                _blurred(product, kernel, finer, rows, columns, held, column)
-                jacobian[:, k] = column
-            jacobian[:, SHAPE:] = basis
-            told = jacobian[:, 0] ** 2 + jacobian[:, 1] ** 2
-            noise = max(np.sum(told * residual**2) / max(np.sum(told), 1e-300) * n / (n - total), ROUNDING)
-            weigh = noise / spread**2
-            normal, right = jacobian.T @ jacobian, jacobian.T @ residual - weigh * (p - expected)
-            for k in range(total):
-                normal[k, k] += weigh[k] + 1e-12 * normal[k, k]
-            cost = np.dot(residual, residual) + np.sum(weigh * (p - expected) ** 2)
+            values, damping = trial.copy(), max(0.1 * damping, 1e-9)
+            jacobian = np.column_stack((_moves(patch, picture, values), picture.basis))
+            noise = _noise(jacobian, residual)
+            weigh = noise / prior.spread**2
+            normal, right = jacobian.T @ jacobian, jacobian.T @ residual - weigh * (values - prior.mean)
+            normal[np.diag_indices_from(normal)] += weigh + 1e-12 * normal.diagonal()
+            cost = residual @ residual + np.sum(weigh * (values - prior.mean) ** 2)
         damped = normal.copy()
-        for k in range(SHAPE):
-            damped[k, k] += damping * normal[k, k]
+        damped[range(SHAPE), range(SHAPE)] *= 1.0 + damping
         step = np.linalg.solve(damped, right)
-        if np.dot(right, step) <= stop * stop * noise:
-            p[:SHAPE] += step[:SHAPE]
-            converged = True
-            break
-        trial[:] = p
-        for k in range(SHAPE):
-            trial[k] += min(max(step[k], -FURTHEST_STEP[k]), FURTHEST_STEP[k])
-        trial[3] = min(max(trial[3], -furthest), furthest)
-        trial[4] = min(max(trial[4], -furthest), furthest)
-        trial[SOFTNESS] = min(max(trial[SOFTNESS], SOFTNESS_LIMITS[0]), SOFTNESS_LIMITS[1])
-    return p, np.linalg.inv(normal) * noise, math.sqrt(noise), converged
+        if right @ step <= STOP * STOP * noise:
+            values[:SHAPE] += step[:SHAPE]
+            return DiscFit(values, np.linalg.inv(normal) * noise, True)
+        trial = values.copy()
+        trial[:SHAPE] += np.clip(step[:SHAPE], -FURTHEST_STEP, FURTHEST_STEP)
+        trial[SHADOW] = np.clip(trial[SHADOW], -prior.furthest_shadow, prior.furthest_shadow)
+        trial[SOFTNESS] = np.clip(trial[SOFTNESS], *SOFTNESS_LIMITS)
+    return DiscFit(values, np.linalg.inv(normal) * noise, False)
+
+
+def _draw(patch: Patch, shape: Array) -> _Picture:
+    """The picture at a shape, for each linear number alone."""
+    opened, rim = _open_share(patch.on_disc, shape, patch.per_px, patch.finer)
+    shade, edge = _shadow(patch.on_board, shape)
+    white = _at_pixels(patch, opened)
+    under = (patch.slope_x, patch.slope_y, -patch.blocked, -shade)
+    basis = np.column_stack((1.0 - white, white, *(_at_pixels(patch, opened * field) for field in under)))
+    return _Picture(opened, shade, basis, rim, edge)
+
+
+def _best_levels(basis: Array, grey: Array, weigh: Array, mean: Array) -> Array:
+    """(6,) linear numbers of least squares with what is known of them beforehand."""
+    square, side = basis.T @ basis, basis.T @ grey
+    square[np.diag_indices_from(square)] += weigh + 1e-9 * square.diagonal()
+    return np.linalg.solve(square, side + weigh * mean)
+
+
+def _moves(patch: Patch, picture: _Picture, values: Array) -> Array:
+    """(n, 6) change of the pixels for a change of the shape."""
+    gx, gy = values[WHITE_GREY + 1 : BLOCKED]
+    under = values[WHITE_GREY] - values[DISC_GREY] + gx * patch.slope_x + gy * patch.slope_y
+    under -= values[BLOCKED] * patch.blocked + values[LAMP] * picture.shade
+    lamp = -values[LAMP] * picture.opened
+    changes = (*(rim * under for rim in picture.rim), *(edge * lamp for edge in picture.edge))
+    return np.column_stack([_at_pixels(patch, change) for change in changes])
+
+
+def _noise(jacobian: Array, residual: Array) -> float:
+    """Variance of the residuals, each weighed by what its pixel says of the disc's place."""
+    n, numbers = jacobian.shape
+    weight = jacobian[:, 0] ** 2 + jacobian[:, 1] ** 2
+    return max(np.sum(weight * residual**2) / max(np.sum(weight), 1e-300) * n / (n - numbers), ROUNDING)
+
+
+def _at_pixels(patch: Patch, fine: Array) -> Array:
+    """(n,) values of a fine grid (h, w), blurred, at the pixels that take part."""
+    return _blurred(fine, patch.kernel, patch.finer, patch.rows, patch.columns)
+
+
+def prepare() -> None:
+    """Call each compiled function once."""
+    places, none = np.ones((2, 1, 1)), np.zeros(0, np.intp)
+    _open_share(places, np.ones(SHAPE + LINEAR), np.eye(2), 1)
+    _shadow(places, np.ones(SHAPE + LINEAR))
+    _blurred(np.ones((1, 1)), np.ones(1), 1, none, none)

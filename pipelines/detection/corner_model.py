@@ -17,24 +17,61 @@ Source:
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from eposit.arrays import Array, Mask
-from pipelines.detection.erf import GAUSS, REORDER, decay, signed_share
+from pipelines.detection.cholesky import solve_damped
+from pipelines.detection.erf import GAUSS, decay, signed_share
+from pipelines.detection.kernels import inlined, reordered
 
 # Numbers of a shape, in order: corner x, y, px from the start; directions of the two normals, rad; blur sigma, px;
 # mean grey m, contrast c; slope of the light g, 1/px.
 SHAPE = 9
 BLUR, MEAN, CONTRAST, SLOPE = 4, 5, 6, 7
 BLUR_LIMITS_PX = (0.2, 6.0)
-FURTHEST_STEP = np.array([0.7, 0.7, 0.15, 0.15, 0.4, 1e9, 1e9, 1e9, 1e9])  # in one iteration
+FURTHEST_STEP = (0.7, 0.7, 0.15, 0.15, 0.4)  # of the first numbers in one iteration; the others are linear
 LEAST_PIXELS = 24
 
 
-@njit(cache=True, fastmath=REORDER, error_model="numpy")
+class CornerTask(NamedTuple):
+    """What a fit of many corners is given; n corners in one image."""
+
+    starts: Array  # (n, 2) px, where each is looked for
+    shapes: Array  # (n, 9) to start from; without a mean grey (NaN), mean and contrast are worked out
+    bends: Array  # (n, 2) curvatures of the edges towards their normals, 1/px
+    inverses: Array  # (n, 2, 2) squares per px
+    reaches: Array  # (n, 2) squares along both axes that a fit may use
+    window: int  # px, likewise
+    discs: Array  # (k, 2) centres, px, of ellipses to leave out
+    disc_axes: Array  # (2, 2) from px to the unit circle of such an ellipse
+
+
+class CornerFits(NamedTuple):
+    """What comes of it; NaN where a corner has too few pixels."""
+
+    shapes: Array  # (n, 9) with the corner in px of the image
+    covariances: Array  # (n, 2, 2) px^2, for noise of one grey level
+    noises: Array  # (n,) variance of the noise that the pixels on the edges show, grey levels^2
+    converged: Mask  # (n,)
+
+
+def fit_corners(image: NDArray[np.uint8], task: CornerTask, steps: int, stop: float) -> CornerFits:
+    """Fit every corner by Levenberg and Marquardt.
+
+    image: (height, width) 8 bits. stop: step, in standard deviations of what is fitted, at which it has converged.
+    """
+    count = len(task.starts)
+    fits = CornerFits(
+        np.full((count, SHAPE), np.nan), np.full((count, 2, 2), np.nan), np.full(count, np.nan), np.zeros(count, bool)
+    )
+    _fit_all(image, *task, steps, stop, *fits)
+    return fits
+
+
+@inlined
 def _model(
     p: Array, x: Array, y: Array, grey: Array, n: int, bend1: float, bend2: float, jacobian: Array, residual: Array
 ) -> None:
@@ -68,38 +105,7 @@ def _model(
         residual[i] = grey[i] - level * light
 
 
-@njit(cache=True)
-def _solve(normal: Array, right: Array, damping: float, out: Array) -> bool:
-    """Cholesky solution of (N + damping diag N) x = b; False where N is not positive definite."""
-    n = len(right)
-    lower = np.zeros((n, n))
-    for i in range(n):
-        for j in range(i + 1):
-            rest = normal[i, j]
-            if i == j:
-                rest += damping * normal[i, i] + 1e-12
-            for k in range(j):
-                rest -= lower[i, k] * lower[j, k]
-            if i != j:
-                lower[i, j] = rest / lower[j, j]
-            elif rest > 0.0:
-                lower[i, i] = math.sqrt(rest)
-            else:
-                return False
-    for i in range(n):
-        rest = right[i]
-        for k in range(i):
-            rest -= lower[i, k] * out[k]
-        out[i] = rest / lower[i, i]
-    for i in range(n - 1, -1, -1):
-        rest = out[i]
-        for k in range(i + 1, n):
-            rest -= lower[k, i] * out[k]
-        out[i] = rest / lower[i, i]
-    return True
-
-
-@njit(cache=True)
+@inlined
 def _gather(
     image: NDArray[np.uint8],
     start: Array,
@@ -132,17 +138,60 @@ def _gather(
     return n
 
 
-@njit(cache=True)
-def _levels(p: Array, jacobian: Array, grey: Array, n: int) -> None:
-    """Mean and contrast by linear regression on the saddle, which `_model` left in the jacobian's row 6."""
-    saddle = jacobian[6, :n]
-    middle, level = saddle.mean(), grey[:n].mean()
-    p[6] = np.sum((saddle - middle) * (grey[:n] - level)) / max(np.sum((saddle - middle) ** 2), 1e-12)
-    p[5] = level - p[6] * middle
+@inlined
+def _clipped(value: float, low: float, high: float) -> float:
+    return low if value < low else high if value > high else value
 
 
-@njit(cache=True)
-def fit_corners(
+@inlined
+def _copy(values: Array, out: Array) -> None:
+    for k in range(len(values)):  # an assignment to a slice takes seconds to compile
+        out[k] = values[k]
+
+
+@inlined
+def _start_levels(saddle: Array, grey: Array, n: int, p: Array) -> None:
+    """Mean and contrast of the shape p by linear regression of the grey values on the saddle."""
+    middle, level = 0.0, 0.0
+    for i in range(n):
+        middle += saddle[i] / n
+        level += grey[i] / n
+    above, square = 0.0, 0.0
+    for i in range(n):
+        above += (saddle[i] - middle) * (grey[i] - level)
+        square += (saddle[i] - middle) ** 2
+    p[CONTRAST] = above / (square + 1e-12)
+    p[MEAN] = level - p[CONTRAST] * middle
+
+
+@inlined
+def _normal_equations(jacobian: Array, residual: Array, n: int, normal: Array, right: Array) -> None:
+    """Lower triangle of J J^T in `normal` and J r in `right`."""
+    for a in range(SHAPE):
+        total = 0.0
+        for i in range(n):
+            total += jacobian[a, i] * residual[i]
+        right[a] = total
+        for b in range(a + 1):
+            total = 0.0
+            for i in range(n):
+                total += jacobian[a, i] * jacobian[b, i]
+            normal[a, b] = total
+
+
+@inlined
+def _noise(jacobian: Array, residual: Array, n: int) -> float:
+    """Variance of the residuals, each weighed by what its pixel says of the position."""
+    square, total = 0.0, 0.0
+    for i in range(n):
+        weight = jacobian[0, i] ** 2 + jacobian[1, i] ** 2
+        square += weight * residual[i] ** 2
+        total += weight
+    return square / (total + 1e-300) * n / (n - SHAPE)
+
+
+@reordered
+def _fit_all(
     image: NDArray[np.uint8],
     starts: Array,
     shapes: Array,
@@ -154,68 +203,61 @@ def fit_corners(
     disc_axes: Array,
     steps: int,
     stop: float,
-) -> tuple[Array, Array, Array, Mask]:
-    """Fit every corner by Levenberg-Marquardt.
-
-    image: (height, width) 8 bits. starts: (n, 2) px. shapes: (n, 9) where to start from; without a mean grey (NaN),
-    mean and contrast are worked out. bends: (n, 2) curvatures of the edges towards their normals, 1/px. inverses:
-    (n, 2, 2) squares per px. reaches: (n, 2) squares that a fit may use along both axes. window: px, likewise.
-    discs: (k, 2) centres, px, of ellipses to leave out, with disc_axes (2, 2) from px to the unit circle. stop: step,
-    in standard deviations of what is fitted, at which it has converged.
-
-    Returns:
-        (n, 9) shapes with the corner in px of the image, (n, 2, 2) covariances, px^2, for noise of one grey level, (n,)
-        variance of the noise that the pixels on the edges show, (n,) whether it converged. NaN where too few pixels
-        are there.
-    """
-    count, most = len(starts), (2 * window + 1) ** 2
-    out, covariances = np.full((count, SHAPE), np.nan), np.full((count, 2, 2), np.nan)
-    noises, converged = np.full(count, np.nan), np.zeros(count, np.bool_)
+    fitted: Array,
+    covariances: Array,
+    noises: Array,
+    converged: Mask,
+) -> None:
+    """The fields of a `CornerTask` into those of `CornerFits`."""
+    most = (2 * window + 1) ** 2
     x, y, grey, residual = np.empty(most), np.empty(most), np.empty(most), np.empty(most)
-    jacobian, step, unit = np.empty((SHAPE, most)), np.empty(SHAPE), np.empty(SHAPE)
-    for i in range(count):
+    jacobian, normal, lower = np.empty((SHAPE, most)), np.empty((SHAPE, SHAPE)), np.empty((SHAPE, SHAPE))
+    right, step, trial = np.empty(SHAPE), np.empty(SHAPE), np.empty(SHAPE)
+    for i in range(len(starts)):
         n = _gather(image, starts[i], inverses[i], reaches[i], window, discs, disc_axes, x, y, grey)
         if n < LEAST_PIXELS:
             continue
-        p, trial = out[i], shapes[i].copy()
-        p[:] = trial
-        if np.isnan(p[5]):
-            trial[5:] = np.array([0.0, 1.0, 0.0, 0.0])
-            _model(trial, x, y, grey, n, bends[i, 0], bends[i, 1], jacobian, residual)
-            _levels(trial, jacobian, grey, n)
-            p[:] = trial
-        rows, left = jacobian[:, :n], residual[:n]
-        normal, right = np.zeros((SHAPE, SHAPE)), np.zeros(SHAPE)
+        p = fitted[i]
+        for k in range(SHAPE):
+            trial[k] = shapes[i, k]
+        unlevelled = np.isnan(trial[MEAN])
+        if unlevelled:  # the saddle alone, on no mean
+            trial[MEAN], trial[CONTRAST], trial[SLOPE], trial[SLOPE + 1] = 0.0, 1.0, 0.0, 0.0
+        _copy(trial, p)
         cost, damping, noise = -1.0, 1e-4, 0.0
-        for _ in range(steps):
+        for count in range(-1 if unlevelled else 0, steps):
             _model(trial, x, y, grey, n, bends[i, 0], bends[i, 1], jacobian, residual)
-            new = np.dot(left, left)
+            if count < 0:
+                _start_levels(jacobian[CONTRAST], grey, n, trial)
+                _copy(trial, p)
+                continue
+            new = 0.0
+            for k in range(n):
+                new += residual[k] * residual[k]
             if cost < 0.0 or new <= cost:
-                p[:] = trial
+                _copy(trial, p)
                 cost, damping = new, 0.1 * damping
-                whole = np.ascontiguousarray(rows)
-                normal, right = np.dot(whole, whole.T), np.dot(whole, left)
-                told = rows[0] ** 2 + rows[1] ** 2  # what a pixel tells of the position
-                noise = np.sum(told * left**2) / max(np.sum(told), 1e-300) * n / (n - SHAPE)
+                _normal_equations(jacobian, residual, n, normal, right)
+                noise = _noise(jacobian, residual, n)
             else:
                 damping *= 10.0
-            if not _solve(normal, right, damping, step):
+            if not solve_damped(normal, right, damping, lower, step):
                 break
-            small = np.dot(right, step) <= stop * stop * noise
+            gain = 0.0
             for k in range(SHAPE):
-                trial[k] = p[k] + min(max(step[k], -FURTHEST_STEP[k]), FURTHEST_STEP[k])
-            trial[BLUR] = min(max(trial[BLUR], BLUR_LIMITS_PX[0]), BLUR_LIMITS_PX[1])
-            if small:
-                p[:] = trial
+                gain += right[k] * step[k]
+                trial[k] = p[k] + (_clipped(step[k], -FURTHEST_STEP[k], FURTHEST_STEP[k]) if k < MEAN else step[k])
+            trial[BLUR] = _clipped(trial[BLUR], BLUR_LIMITS_PX[0], BLUR_LIMITS_PX[1])
+            if gain <= stop * stop * noise:
+                _copy(trial, p)
                 converged[i] = True
                 break
         for k in range(2):
-            unit[:] = 0.0
-            unit[k] = 1.0
-            if not _solve(normal, unit, 0.0, step):
+            for m in range(SHAPE):
+                right[m] = 1.0 if m == k else 0.0
+            if not solve_damped(normal, right, 0.0, lower, step):
                 converged[i] = False
             covariances[i, 0, k], covariances[i, 1, k] = step[0], step[1]
         noises[i] = noise
         p[0] += starts[i, 0]
         p[1] += starts[i, 1]
-    return out, covariances, noises, converged

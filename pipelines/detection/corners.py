@@ -8,7 +8,7 @@ import numpy as np
 
 from eposit.arrays import Array, Mask
 from pipelines.detection.board_map import BoardMap, grid, normal_angles
-from pipelines.detection.corner_model import BLUR, CONTRAST, MEAN, SHAPE, SLOPE, fit_corners
+from pipelines.detection.corner_model import BLUR, CONTRAST, MEAN, SHAPE, SLOPE, CornerTask, fit_corners
 from pipelines.detection.finders import Grey
 from render.targets.chessboard import Target
 
@@ -83,10 +83,17 @@ def _fit(image: Grey, board: BoardMap, target: Target, shapes: Array, window: in
     lengths = np.linalg.norm(jacobian, axis=1)
     reach = np.clip(1.0 - CLEAR_BLURS * shapes[:, BLUR, None] / lengths, LEAST_REACH, REACH)
     discs, disc_axes = _around_circle(board, target)
-    fitted, covariance, noise, converged = fit_corners(
-        image, starts, shapes, board.curvatures(at, jacobian), np.linalg.inv(jacobian), reach, window, discs,
-        disc_axes, steps, STOP,
-    )  # fmt: skip
+    task = CornerTask(
+        starts=starts,
+        shapes=shapes,
+        bends=board.curvatures(at, jacobian),
+        inverses=np.linalg.inv(jacobian),
+        reaches=reach,
+        window=window,
+        discs=discs,
+        disc_axes=disc_axes,
+    )
+    fitted, covariance, noise, converged = fit_corners(image, task, steps, STOP)
     points = fitted[:, :2]
     with np.errstate(invalid="ignore"):
         side = np.sqrt(np.abs(np.linalg.det(jacobian)))

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from pipelines.detection.kernels import inlined
 
-# Order of sums and products may change for speed; infinities and NaN keep their meaning.
-REORDER = {"contract", "reassoc", "arcp", "nsz"}
 FARTHEST = 60.0  # exp(-60) is nothing beside a grey value
 GAUSS = math.sqrt(2.0 / math.pi)
 HALF_ROOT = math.sqrt(0.5)
 
 
-@njit(cache=True, fastmath=REORDER, error_model="numpy", inline="always")
+@inlined
 def decay(u: float) -> float:
     """exp(-u) for u >= 0: the Taylor series of a 64th, raised to the 64th power."""
-    y = min(u, FARTHEST) * (-1.0 / 64.0)
+    y = (u if u < FARTHEST else FARTHEST) * (-1.0 / 64.0)
     e = 1.0 + y * (1.0 + y * (1 / 2 + y * (1 / 6 + y * (1 / 24 + y * (1 / 120 + y * (1 / 720 + y * (1 / 5040)))))))
     e *= e
     e *= e
@@ -26,7 +24,7 @@ def decay(u: float) -> float:
     return e * e
 
 
-@njit(cache=True, fastmath=REORDER, error_model="numpy", inline="always")
+@inlined
 def signed_share(a: float, bell: float) -> float:
     """erf(a / sqrt 2) for a standard normal's a, with `bell` = exp(-a^2 / 2).
 

@@ -15,9 +15,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from eposit.arrays import Array
+from pipelines.detection.cholesky import solve_damped
+from pipelines.detection.kernels import ordered, ordered_part
 
 PARAMETERS = 13  # rotation 3, translation 3, lens 7
 NEWTON_STEPS = 12
@@ -25,7 +26,7 @@ TRIES = 8
 LEAST_GAIN = 1e-4  # of the cost in one step: a hundredth of a corner; a pinhole would wander for a hundred steps
 
 
-@njit(cache=True)
+@ordered
 def project(R: Array, t: Array, lens: Array, x: Array, y: Array, z: float, out: Array) -> None:
     """Points (n,), (n,) on the plane z of the board to (n, 2) px in `out`."""
     f, aspect, cx, cy, k1, k2, k3 = lens
@@ -41,32 +42,48 @@ def project(R: Array, t: Array, lens: Array, x: Array, y: Array, z: float, out: 
         out[i, 1] = cy + scale * v * (1.0 + aspect)
 
 
-@njit(cache=True)
-def _turned(vector: Array, R: Array) -> Array:
-    """R with a rotation vector (3,) applied on the left."""
-    angle = math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
-    cross = np.array([[0.0, -vector[2], vector[1]], [vector[2], 0.0, -vector[0]], [-vector[1], vector[0], 0.0]])
-    if angle < 1e-9:
-        return R + cross @ R
-    return R + (math.sin(angle) / angle * cross + (1.0 - math.cos(angle)) / angle**2 * (cross @ cross)) @ R
+@ordered_part
+def _changed(R: Array, t: Array, lens: Array, change: Array, R_out: Array, t_out: Array, lens_out: Array) -> None:
+    """R with the rotation vector `change[:3]` applied on the left; t and lens with the rest added.
+
+    Source:
+        Rodrigues' formula.
+    """
+    a, b, c = change[0], change[1], change[2]
+    square = a * a + b * b + c * c
+    angle = math.sqrt(square)
+    sine, cosine = (1.0, 0.5) if angle < 1e-9 else (math.sin(angle) / angle, (1.0 - math.cos(angle)) / square)
+    for k in range(3):
+        x, y, z = R[0, k], R[1, k], R[2, k]
+        along = a * x + b * y + c * z
+        R_out[0, k] = x + sine * (b * z - c * y) + cosine * (a * along - square * x)
+        R_out[1, k] = y + sine * (c * x - a * z) + cosine * (b * along - square * y)
+        R_out[2, k] = z + sine * (a * y - b * x) + cosine * (c * along - square * z)
+        t_out[k] = t[k] + change[3 + k]
+    for k in range(len(lens)):
+        lens_out[k] = lens[k] + change[6 + k]
 
 
-@njit(cache=True)
-def _changed(R: Array, t: Array, lens: Array, change: Array) -> tuple[Array, Array, Array]:
-    return _turned(change[:3], R), t + change[3:6], lens + change[6:]
+@ordered_part
+def _copy_pose(R: Array, t: Array, lens: Array, R_out: Array, t_out: Array, lens_out: Array) -> None:
+    for k in range(3):
+        t_out[k] = t[k]
+        for m in range(3):
+            R_out[k, m] = R[k, m]
+    for k in range(len(lens)):
+        lens_out[k] = lens[k]
 
 
-@njit(cache=True)
+@ordered
 def slopes(R: Array, t: Array, lens: Array, x: Array, y: Array, out: Array) -> None:
     """(2 n, 13) change of the pixels of points on the board for a change of each parameter.
 
     In order: a rotation vector on the left of R, the translation, the lens.
     """
     f, aspect, _, _, k1, k2, k3 = lens
-    stretch = np.array([1.0, 1.0 + aspect])
     for i in range(len(x)):
-        arm = R[:, 0] * x[i] + R[:, 1] * y[i]
-        u, v, w = arm[0] + t[0], arm[1] + t[1], arm[2] + t[2]
+        a, b, c = R[0, 0] * x[i] + R[0, 1] * y[i], R[1, 0] * x[i] + R[1, 1] * y[i], R[2, 0] * x[i] + R[2, 1] * y[i]
+        u, v, w = a + t[0], b + t[1], c + t[2]
         side = max(math.hypot(u, v), 1e-12)
         theta, square = math.atan2(side, w), side * side + w * w
         t2 = theta * theta
@@ -74,25 +91,26 @@ def slopes(R: Array, t: Array, lens: Array, x: Array, y: Array, out: Array) -> N
         rise = f * (1.0 + t2 * (3.0 * k1 + t2 * (5.0 * k2 + t2 * 7.0 * k3))) / square
         cosine, sine, along, around = u / side, v / side, rise * w, radius / side
         for k in range(2):
+            stretch = 1.0 + aspect if k == 1 else 1.0
             same, other = (cosine, sine) if k == 0 else (sine, cosine)
             mixed, own = same * other * (along - around), same * same * along + other * other * around
             du, dv = (own, mixed) if k == 0 else (mixed, own)
             dw = -same * rise * side
-            row = out[2 * i + k]
-            row[0], row[1], row[2] = arm[1] * dw - arm[2] * dv, arm[2] * du - arm[0] * dw, arm[0] * dv - arm[1] * du
-            row[3], row[4], row[5] = du, dv, dw
-            row[6] = radius / f * same
-            row[7] = radius * same * k / stretch[1]
-            row[8], row[9] = 1.0 - k, float(k) / stretch[1]
+            row = 2 * i + k
+            out[row, 0], out[row, 1], out[row, 2] = b * dw - c * dv, c * du - a * dw, a * dv - b * du
+            out[row, 3], out[row, 4], out[row, 5] = du, dv, dw
+            out[row, 6] = radius / f * same
+            out[row, 7] = radius * same * k / stretch
+            out[row, 8], out[row, 9] = 1.0 - k, k / stretch
             power = f * theta * same
             for degree in range(3):
                 power *= t2
-                row[10 + degree] = power
+                out[row, 10 + degree] = power
             for column in range(PARAMETERS):
-                row[column] *= stretch[k]
+                out[row, column] *= stretch
 
 
-@njit(cache=True)
+@ordered_part
 def _cost(pixels: Array, found: Array, weights: Array, lens: Array, expected: Array, hold: Array) -> float:
     total = 0.0
     for i in range(len(pixels)):
@@ -102,7 +120,26 @@ def _cost(pixels: Array, found: Array, weights: Array, lens: Array, expected: Ar
     return total
 
 
-@njit(cache=True)
+@ordered_part
+def _normal_equations(
+    jacobian: Array, pixels: Array, found: Array, weights: Array, normal: Array, right: Array
+) -> None:
+    """Lower triangle of J^T W J in `normal` and J^T W r in `right`."""
+    for a in range(PARAMETERS):
+        right[a] = 0.0
+        for b in range(a + 1):
+            normal[a, b] = 0.0
+    for i in range(len(pixels)):
+        for k in range(2):
+            row, residual = 2 * i + k, pixels[i, k] - found[i, k]
+            for a in range(PARAMETERS):
+                weighted = weights[i] * jacobian[row, a]
+                right[a] += weighted * residual
+                for b in range(a + 1):
+                    normal[a, b] += weighted * jacobian[row, b]
+
+
+@ordered
 def fit(
     R: Array, t: Array, lens: Array, x: Array, y: Array, pixels: Array, weights: Array, hold: Array, steps: int
 ) -> tuple[Array, Array, Array]:
@@ -111,35 +148,33 @@ def fit(
     weights: (n,) inverse variances, 0 where a point takes no part. hold: (7,) weak weights that keep the lens near
     where it starts, for what one view does not tell.
     """
-    n, expected = len(x), lens.copy()
-    found, trial = np.empty((n, 2)), np.empty((n, 2))
-    jacobian, residual, scale = np.empty((2 * n, PARAMETERS)), np.empty(2 * n), np.empty(2 * n)
-    for i in range(n):
-        scale[2 * i] = scale[2 * i + 1] = math.sqrt(weights[i])
+    n, expected = len(x), lens
+    R_old, t_old, R, t, lens = R, t, np.empty((3, 3)), np.empty(3), np.empty(len(lens))
+    _copy_pose(R_old, t_old, expected, R, t, lens)
+    R_new, t_new, lens_new = np.empty((3, 3)), np.empty(3), np.empty(len(lens))
+    found, trial, jacobian = np.empty((n, 2)), np.empty((n, 2)), np.empty((2 * n, PARAMETERS))
+    normal, lower = np.empty((PARAMETERS, PARAMETERS)), np.empty((PARAMETERS, PARAMETERS))
+    right, change = np.empty(PARAMETERS), np.empty(PARAMETERS)
     project(R, t, lens, x, y, 0.0, found)
     cost, damping = _cost(pixels, found, weights, lens, expected, hold), 1e-3
     for _ in range(steps):
         slopes(R, t, lens, x, y, jacobian)
-        for i in range(2 * n):
-            residual[i] = (pixels[i // 2, i % 2] - found[i // 2, i % 2]) * scale[i]
-            jacobian[i] *= scale[i]
-        normal, gradient = jacobian.T @ jacobian, jacobian.T @ residual
+        _normal_equations(jacobian, pixels, found, weights, normal, right)
         for k in range(1, 7):
             normal[6 + k, 6 + k] += hold[k]
-            gradient[6 + k] -= hold[k] * (lens[k] - expected[k])
+            right[6 + k] -= hold[k] * (lens[k] - expected[k])
         gain = 0.0
         for _ in range(TRIES):
-            damped = normal.copy()
-            for k in range(PARAMETERS):
-                damped[k, k] += damping * normal[k, k] + 1e-30
-            proposal = _changed(R, t, lens, np.linalg.solve(damped, gradient))
-            project(proposal[0], proposal[1], proposal[2], x, y, 0.0, trial)
-            new = _cost(pixels, trial, weights, proposal[2], expected, hold)
+            new = np.inf
+            if solve_damped(normal, right, damping, lower, change):
+                _changed(R, t, lens, change, R_new, t_new, lens_new)
+                project(R_new, t_new, lens_new, x, y, 0.0, trial)
+                new = _cost(pixels, trial, weights, lens_new, expected, hold)
             if new <= cost:
-                gain = (cost - new) / max(cost, 1e-300)
-                R, t, lens = proposal
-                found[:] = trial
-                cost, damping = new, max(0.1 * damping, 1e-9)
+                gain = (cost - new) / cost if cost > 0.0 else 0.0
+                _copy_pose(R_new, t_new, lens_new, R, t, lens)
+                found, trial = trial, found
+                cost, damping = new, 0.1 * damping if damping > 1e-8 else 1e-9
                 break
             damping *= 10.0
         if gain < LEAST_GAIN:
@@ -147,14 +182,16 @@ def fit(
     return R, t, lens
 
 
-@njit(cache=True)
+@ordered
 def meet_planes(R: Array, t: Array, lens: Array, x: Array, y: Array, heights: Array, out: Array) -> None:
     """Where the rays of pixels at columns x (w,) and rows y (h,) meet planes parallel to the board.
 
     heights: (k,) z of the planes. out: (k, 2, h, w) board coordinates.
     """
     f, aspect, cx, cy, k1, k2, k3 = lens
-    origin = -(R.T @ t)
+    ox = -(R[0, 0] * t[0] + R[1, 0] * t[1] + R[2, 0] * t[2])
+    oy = -(R[0, 1] * t[0] + R[1, 1] * t[1] + R[2, 1] * t[2])
+    oz = -(R[0, 2] * t[0] + R[1, 2] * t[1] + R[2, 2] * t[2])
     for row in range(len(y)):
         theta = 0.0
         for column in range(len(x)):
@@ -175,6 +212,6 @@ def meet_planes(R: Array, t: Array, lens: Array, x: Array, y: Array, heights: Ar
             dy = R[0, 1] * a + R[1, 1] * b + R[2, 1] * c
             dz = R[0, 2] * a + R[1, 2] * b + R[2, 2] * c
             for k in range(len(heights)):
-                reach = (heights[k] - origin[2]) / dz
-                out[k, 0, row, column] = origin[0] + reach * dx
-                out[k, 1, row, column] = origin[1] + reach * dy
+                reach = (heights[k] - oz) / dz
+                out[k, 0, row, column] = ox + reach * dx
+                out[k, 1, row, column] = oy + reach * dy

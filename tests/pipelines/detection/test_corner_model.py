@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipelines.detection.corner_model import BLUR, SHAPE, fit_corners
+from pipelines.detection.corner_model import BLUR, SHAPE, CornerTask, fit_corners
 from pipelines.detection.corners import REACH, STOP, WINDOW_PX
 from tests.supersampled import digitised, picture, side
 
@@ -88,10 +88,8 @@ def fitted(image, corners, scene, rng, start_px=0.3, **changed):
         "disc_axes": np.eye(2),
         **changed,
     }
-    shapes, covariance, noise, converged = fit_corners(
-        image, given["starts"], shapes, given["bends"], np.tile(inverse, (n, 1, 1)), given["reaches"], WINDOW_PX,
-        given["discs"], given["disc_axes"], STEPS, STOP,
-    )  # fmt: skip
+    task = CornerTask(shapes=shapes, inverses=np.tile(inverse, (n, 1, 1)), window=WINDOW_PX, **given)
+    shapes, covariance, noise, converged = fit_corners(image, task, STEPS, STOP)
     return shapes[:, :2] - middles - corners, shapes, covariance * noise[:, None, None], noise, converged
 
 
