@@ -61,7 +61,7 @@ def test_where_nothing_can_be_kept_beside_the_source_the_user_has_a_folder(tmp_p
         "    @classmethod\n"
         "    def from_function(cls, function, path):\n"
         "        return None\n"
-        "caching.CacheImpl._locator_classes = [caching._UserProvidedCacheLocator, Nowhere]\n"
+        "caching.CacheImpl._locator_classes = [caching.UserProvidedCacheLocator, Nowhere]\n"
         "from pipelines.detection.kernels import ordered\n"
         "from pipelines.detection.cholesky import solve_damped\n"
         "import numpy as np\n"
