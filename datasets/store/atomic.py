@@ -1,24 +1,163 @@
-"""Atomic files: a temporary name beside the target, flushed to disk, then renamed."""
+"""Atomic files: a temporary name beside the target, flushed to disk, then renamed.
+
+A file that belongs to one process while it is written says so twice. Its name holds the host, the process id and a
+random number, so that no two processes, on whatever node, ever choose the same. And the process holds it locked with
+`flock`, which the kernel releases when the process ends in whatever way. So whether a file is abandoned is a question
+to the kernel: process ids are used again, and mean nothing in another container or on another node.
+"""
 
 from __future__ import annotations
 
 import os
+import platform
+import re
+import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
+from enum import Enum
 from pathlib import Path
 
+from datasets.store.refusals import refused
+
+try:
+    import fcntl
+except ImportError:  # a system without flock: files of others are then never taken for abandoned
+    fcntl = None
+
 TEMPORARY_PREFIX = ".tmp-"
+OWN_NAME = re.compile(r"\.[a-z]+-(?P<host>.+)-\d+-[0-9a-f]{16}")
+NAME_LIMIT = 64  # letters of a host's name, and of a target's name, in a temporary one: 255 bytes is a name's limit
+TRIES = 100
+
+
+class State(Enum):
+    """What is known of the process that a file belongs to."""
+
+    LIVE = "live"  # it holds the file
+    GONE = "gone"  # it ended and left the file behind
+    UNKNOWN = "unknown"  # on another host, or on a file system that cannot tell
+
+
+def host() -> str:
+    """This machine's name, in letters that a file's name can have."""
+    return re.sub(r"[^A-Za-z0-9._-]", "_", platform.node())[:NAME_LIMIT] or "unknown"
+
+
+def own_name(prefix: str) -> str:
+    """A name that no other process, and no other call, chooses."""
+    return f"{prefix}{host()}-{os.getpid()}-{secrets.token_hex(8)}"
+
+
+def create_owned(folder: Path, prefix: str, suffix: str = "") -> tuple[Path, int]:
+    """A new empty file of a name of its own, and its descriptor, which holds it until it is closed.
+
+    Raises:
+        OSError: the system refuses.
+    """
+    for _ in range(TRIES):
+        path = folder / f"{own_name(prefix)}{suffix}"
+        descriptor = os.open(path, os.O_CREAT | os.O_EXCL | os.O_RDWR | getattr(os, "O_CLOEXEC", 0), 0o666)
+        # Between creation and the lock a sweep may take the file for abandoned: then it is gone, and another is made.
+        if _try_lock(descriptor, alone=True) is not State.LIVE and os.fstat(descriptor).st_nlink:
+            return path, descriptor
+        os.close(descriptor)
+    raise OSError(f"no temporary file can be kept in {folder}")
+
+
+def state_of(path: Path) -> State:
+    """Whether the process that a file of `create_owned` belongs to still runs. A file that is not there: GONE."""
+    name = OWN_NAME.match(path.name)
+    if name and name["host"] != host():
+        return State.UNKNOWN
+    try:
+        descriptor = os.open(path, os.O_RDONLY)
+    except FileNotFoundError:
+        return State.GONE
+    except OSError:
+        return State.UNKNOWN
+    try:
+        return _try_lock(descriptor, alone=False)  # two who ask at once do not hinder each other
+    finally:
+        os.close(descriptor)
+
+
+def _try_lock(descriptor: int, *, alone: bool) -> State:
+    """Lock a file: LIVE if another process holds it, GONE if none does, UNKNOWN if the file system has no locks."""
+    if fcntl is None:
+        return State.UNKNOWN
+    try:
+        fcntl.flock(descriptor, (fcntl.LOCK_EX if alone else fcntl.LOCK_SH) | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return State.LIVE
+    except OSError:
+        return State.UNKNOWN
+    return State.GONE
+
+
+def sweep(root: Path) -> None:
+    """Remove the temporary files under a folder whose process of this host has ended; those of others stay."""
+    for path in root.rglob(f"{TEMPORARY_PREFIX}*"):
+        if path.is_file() and state_of(path) is State.GONE:
+            path.unlink(missing_ok=True)
 
 
 @contextmanager
 def replace_atomically(path: Path) -> Iterator[Path]:
-    """A temporary path to write to; on success it takes the place of `path`, on failure nothing changes."""
+    """A temporary path to write to; on success it takes the place of `path`, on failure nothing changes.
+
+    The file is there already and is to be written in place: a new file of that name would not be held.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f"{TEMPORARY_PREFIX}{os.getpid()}-{path.name}")
+    temporary, descriptor = create_owned(path.parent, TEMPORARY_PREFIX, f"-{path.name[-NAME_LIMIT:]}")
     try:
         yield temporary
-        with open(temporary, "rb+") as file:
-            os.fsync(file.fileno())
+        os.fsync(descriptor)
         temporary.replace(path)
     finally:
+        os.close(descriptor)
         temporary.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file that is never half there.
+
+    Raises:
+        UserError: the disk refuses.
+    """
+    try:
+        with replace_atomically(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise refused(path, error) from error
+
+
+def create_text(path: Path, text: str) -> bool:
+    """Write a file unless one is there; of several who try at once one does. Whether this call did.
+
+    Raises:
+        UserError: the disk refuses.
+    """
+    try:
+        temporary, descriptor = create_owned(path.parent, TEMPORARY_PREFIX)
+        try:
+            temporary.write_text(text, encoding="utf-8")
+            os.fsync(descriptor)
+            _link(temporary, path)
+        finally:
+            os.close(descriptor)
+            temporary.unlink(missing_ok=True)
+    except FileExistsError:
+        return False
+    except OSError as error:
+        raise refused(path, error) from error
+    return True
+
+
+def _link(source: Path, path: Path) -> None:
+    try:
+        os.link(source, path)
+    except FileExistsError:
+        raise
+    except OSError:  # a file system without links: a reader may then see the file half written
+        with open(path, "x", encoding="utf-8") as file:
+            file.write(source.read_text(encoding="utf-8"))

@@ -6,10 +6,7 @@ carries the recipe's hash and the schema's version. Resuming is doing what is no
 
 from __future__ import annotations
 
-import errno
 import json
-import os
-import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,14 +17,14 @@ import pyarrow.parquet as pq
 from datasets.errors import UserError
 from datasets.recipe.model import Recipe, load_recipe
 from datasets.schema import SCHEMA_VERSION, TABLES, dictionary
-from datasets.store.atomic import TEMPORARY_PREFIX, replace_atomically
+from datasets.store.atomic import replace_atomically, write_text
 from datasets.store.digest import table_digest
+from datasets.store.refusals import SHARD_NAME, damaged, missing, refused, stage_of, unreadable
 
 RECIPE_FILE = "recipe.toml"
 MANIFEST_FILE = "manifest.json"
 CARD_FILE = "README.md"
 RECIPE_KEY, VERSION_KEY, DIGEST_KEY = b"recipe", b"schema_version", b"content"
-SHARD_NAME = re.compile(r"([^.].*)-\d{5,}-of-(\d{5,})\.parquet")  # temporary and foreign files have other names
 
 
 @dataclass(frozen=True)
@@ -143,14 +140,14 @@ class Dataset:
         """
         entries = [self._manifest_entry(path) for table in TABLES for path in self.shards(table)]
         manifest = {"recipe": self.recipe.digest(), "schema_version": SCHEMA_VERSION, "shards": entries}
-        self._write_text(MANIFEST_FILE, json.dumps(manifest, indent=1) + "\n")
+        write_text(self.root / MANIFEST_FILE, json.dumps(manifest, indent=1) + "\n")
         frames = sum(entry["rows"] for entry in entries if entry["path"].startswith("frames/"))
         title = f"# {self.recipe.name}\n\n{self.recipe.description}\n\n{frames} frames. "
         conventions = (
             "Camera axes x right, y down, z forward; pixel centres at integers; lengths in mm; cam_from_obj carries "
             "object points into the camera frame. Failed rows keep their place with a status and NaN."
         )
-        self._write_text(CARD_FILE, f"{title}{conventions}\n\n## Tables\n\n{dictionary()}")
+        write_text(self.root / CARD_FILE, f"{title}{conventions}\n\n## Tables\n\n{dictionary()}")
 
     def _manifest_entry(self, path: Path) -> dict[str, Any]:
         try:
@@ -161,18 +158,6 @@ class Dataset:
             raise damaged(path) from None
         content = (footer.metadata or {}).get(DIGEST_KEY, b"").decode()
         return {"path": str(path.relative_to(self.root)), "rows": footer.num_rows, "content": content}
-
-    def _write_text(self, name: str, text: str) -> None:
-        try:
-            with replace_atomically(self.root / name) as temporary:
-                temporary.write_text(text, encoding="utf-8")
-        except OSError as error:
-            raise refused(self.root / name, error) from error
-
-    def sweep(self) -> None:
-        """Remove temporary files that a killed run left behind."""
-        for path in self.root.rglob(f"{TEMPORARY_PREFIX}*"):
-            path.unlink(missing_ok=True)
 
 
 def open_dataset(root: Path) -> Dataset:
@@ -185,69 +170,3 @@ def open_dataset(root: Path) -> Dataset:
     if not path.is_file():
         raise UserError(f"{root} holds no dataset ({RECIPE_FILE} is missing); run `generate RECIPE --out {root}` first")
     return Dataset(root, load_recipe(str(path))[0])
-
-
-def claim(root: Path, recipe: Recipe, text: str) -> Dataset:
-    """Bind a folder to one recipe, so that a second run resumes and another recipe cannot blend in.
-
-    Raises:
-        UserError: the folder holds another recipe or other files, or cannot be written.
-    """
-    path = root / RECIPE_FILE
-    dataset = Dataset(root, recipe)
-    if path.exists():
-        if load_recipe(str(path))[0].digest() != recipe.digest():
-            raise UserError(f"{root} holds a dataset of another recipe; choose another --out or delete it")
-        dataset.sweep()
-        return dataset
-    if root.exists() and not root.is_dir():
-        raise UserError(f"{root} is a file; give a folder to --out")
-    if root.exists() and any(not entry.name.startswith(TEMPORARY_PREFIX) for entry in root.iterdir()):
-        raise UserError(f"{root} is not empty and holds no dataset; choose a new or empty folder for --out")
-    dataset._write_text(RECIPE_FILE, text)
-    return dataset
-
-
-def missing(path: Path) -> UserError:
-    """A shard that is not there, as a sentence."""
-    return UserError(f"{path} is missing; run the {stage_of(path)} stage first")
-
-
-def damaged(path: Path) -> UserError:
-    """A shard that cannot be decoded, as a sentence."""
-    return UserError(f"{path} is damaged; delete it and run the {stage_of(path)} stage again")
-
-
-def unreadable(path: Path) -> UserError:
-    """A shard that this user may not read, as a sentence: it may be sound, so it is not to be deleted."""
-    return UserError(f"cannot read {path}: this user has no permission; ask its owner for it")
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a file that is never half there.
-
-    Raises:
-        UserError: the disk refuses.
-    """
-    try:
-        with replace_atomically(path) as temporary:
-            temporary.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise refused(path, error) from error
-
-
-def refused(path: Path, error: OSError) -> UserError:
-    """What the operating system refused, as a sentence."""
-    if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
-        return UserError(f"cannot write {path}: the folder is read-only for this user; choose another --out")
-    if error.errno == errno.ENOSPC:
-        return UserError(f"cannot write {path}: the disk is full; free space and run again, finished shards are kept")
-    return UserError(f"cannot write {path}: {os.strerror(error.errno) if error.errno else error}; choose another --out")
-
-
-def stage_of(path: Path) -> str:
-    """The stage that makes a table's files; for another detector's points with the option that names it."""
-    stage = {"detections": "detect", "estimates": "estimate", "scores": "score"}.get(path.parent.name, "generate")
-    shard = SHARD_NAME.fullmatch(path.name)
-    variant = shard[1] if shard and stage == "detect" and shard[1] != path.parent.name else ""
-    return f"{stage} --detector {variant}" if variant else stage

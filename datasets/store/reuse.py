@@ -9,8 +9,9 @@ from pathlib import Path
 
 from datasets.errors import UserError
 from datasets.store.atomic import replace_atomically
-from datasets.store.dataset import Dataset, open_dataset, refused
+from datasets.store.dataset import Dataset, open_dataset
 from datasets.store.linear_images import LinearImageError, masters, read_linear
+from datasets.store.refusals import refused
 
 
 def reuse_linear_images(dataset: Dataset, source: Path) -> tuple[int, int]:

@@ -10,9 +10,10 @@ import pyarrow.parquet as pq
 from datasets.errors import UserError
 from datasets.plan import shard_count
 from datasets.schema import TABLES
-from datasets.store.dataset import DIGEST_KEY, Dataset, stage_of
+from datasets.store.dataset import DIGEST_KEY, Dataset
 from datasets.store.digest import table_digest
 from datasets.store.linear_images import LinearImageError, masters, read_linear
+from datasets.store.refusals import stage_of
 
 
 def verify(dataset: Dataset) -> tuple[str, list[str]]:

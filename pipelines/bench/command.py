@@ -10,7 +10,7 @@ from rich.progress import Progress
 
 from datasets.errors import UserError
 from datasets.recipe.model import Recipe
-from datasets.store.dataset import write_text
+from datasets.store.atomic import write_text
 from pipelines.bench import blender, memory, profile
 from pipelines.bench import detection as finders
 from pipelines.bench import end_to_end as whole

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -24,26 +26,44 @@ def load(recipe: str, regime: str | None) -> tuple[Any, str]:
     return parse_recipe(text, f"recipe {recipe} with --regime {regime}"), text
 
 
-def begin(recipe: str, out: Path, regime: str | None, reuse: Path | None, console: Console) -> Any:
+@contextmanager
+def begin(recipe: str, out: Path, regime: str | None, reuse: Path | None, console: Console) -> Iterator[Any]:
     """The dataset of a recipe, begun or resumed in `out`, with linear light from `reuse` where it fits.
 
+    Nobody else writes it while the body runs.
+
     Raises:
-        UserError: a recipe, folder or plan that is not usable.
+        UserError: a recipe, folder or plan that is not usable, or another process writes the folder.
     """
     from datasets.plan import plan
-    from datasets.store.dataset import claim, open_dataset
+    from datasets.store.claim import claim
+    from datasets.store.dataset import open_dataset
 
     loaded, text = load(recipe, regime)
     plan(loaded)
     if reuse is not None:
         open_dataset(reuse)  # before anything is written
-    dataset = claim(out, loaded, text)
-    if reuse is not None:
-        from datasets.store.reuse import reuse_linear_images
+    with claim(out, loaded, text) as dataset:
+        if reuse is not None:
+            from datasets.store.reuse import reuse_linear_images
 
-        taken, lacking = reuse_linear_images(dataset, reuse)
-        console.print(f"linear images: {taken} of {lacking} taken from {reuse}; the rest is rendered")
-    return dataset
+            taken, lacking = reuse_linear_images(dataset, reuse)
+            console.print(f"linear images: {taken} of {lacking} taken from {reuse}; the rest is rendered")
+        yield dataset
+
+
+@contextmanager
+def writing(folder: Path) -> Iterator[Any]:
+    """The dataset in a folder; nobody else writes it while the body runs.
+
+    Raises:
+        UserError: there is none, or another process writes it.
+    """
+    from datasets.store.lock import hold
+
+    dataset = opened(folder)
+    with hold(folder):
+        yield dataset
 
 
 def opened(folder: Path) -> Any:

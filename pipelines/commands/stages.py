@@ -9,7 +9,7 @@ from rich.console import Console
 
 from datasets.errors import UserError
 from pipelines.commands import options as o
-from pipelines.commands.opening import begin, opened
+from pipelines.commands.opening import begin, opened, writing
 
 
 def run(
@@ -27,12 +27,12 @@ def run(
 
     console = Console(quiet=quiet)
     settings = [*RUN_SETTINGS, *settings_of(solver or [])]
-    dataset = begin(recipe, out, regime, reuse, console)
-    stages.run_generate(dataset, workers, console)
-    stages.run_detect(dataset, workers, console)
-    stages.run_estimate(dataset, settings, workers, console)
-    stages.run_score(dataset, workers, console)
-    report(out)
+    with begin(recipe, out, regime, reuse, console) as dataset:
+        stages.run_generate(dataset, workers, console)
+        stages.run_detect(dataset, workers, console)
+        stages.run_estimate(dataset, settings, workers, console)
+        stages.run_score(dataset, workers, console)
+        report(out)
 
 
 def demo(
@@ -54,7 +54,8 @@ def generate(
     from pipelines.stages import run as stages
 
     console = Console(quiet=quiet)
-    stages.run_generate(begin(recipe, out, regime, reuse, console), workers, console)
+    with begin(recipe, out, regime, reuse, console) as dataset:
+        stages.run_generate(dataset, workers, console)
 
 
 def detect(
@@ -63,7 +64,8 @@ def detect(
     """Find corners and circle in the images; each detector's points stay beside the others'."""
     from pipelines.stages import run as stages
 
-    stages.run_detect(opened(folder), workers, Console(quiet=quiet), detector)
+    with writing(folder) as dataset:
+        stages.run_detect(dataset, workers, Console(quiet=quiet), detector)
 
 
 def estimate(
@@ -87,11 +89,13 @@ def estimate(
     setting = Setting("best" if solver is None else solver, points, camera, use, noise_px, draws, detector)
     console = Console(quiet=quiet)
     if estimator is None:
-        stages.run_estimate(opened(folder), [setting], workers, console, overwrite=overwrite)
+        with writing(folder) as dataset:
+            stages.run_estimate(dataset, [setting], workers, console, overwrite=overwrite)
         return
     if solver is not None or setting != Setting(camera=camera):
         raise UserError("--estimator is given images: leave out --solver and the options that choose points")
-    stages.run_system(opened(folder), System(estimator, camera), workers, console, overwrite=overwrite)
+    with writing(folder) as dataset:
+        stages.run_system(dataset, System(estimator, camera), workers, console, overwrite=overwrite)
 
 
 def score(
@@ -110,10 +114,11 @@ def score(
         raise UserError("--poses and --name go together; give a file of poses and what to call them, or neither")
     if poses is None and camera != "exact":
         raise UserError("--camera goes with --poses; leave it out, or give a file of poses")
-    dataset, console = opened(folder), Console(quiet=quiet)
-    if poses is not None and name is not None:
-        stages.run_import(dataset, poses, System(name, camera), console)
-    stages.run_score(dataset, workers, console)
+    console = Console(quiet=quiet)
+    with writing(folder) as dataset:
+        if poses is not None and name is not None:
+            stages.run_import(dataset, poses, System(name, camera), console)
+        stages.run_score(dataset, workers, console)
 
 
 def report(folder: o.Folder) -> None:

@@ -11,7 +11,8 @@ from rich.progress import Progress
 from threadpoolctl import threadpool_limits
 
 from datasets.errors import UserError
-from datasets.store.dataset import refused, write_text
+from datasets.store.atomic import write_text
+from datasets.store.refusals import refused
 from pipelines.doctor import versions
 from pipelines.engines.local import check_workers
 from pipelines.paper.claims import Claim, Drawing, Section

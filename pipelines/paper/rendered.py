@@ -10,7 +10,9 @@ import pyarrow as pa
 from rich.console import Console
 
 from datasets.recipe.model import load_recipe
-from datasets.store.dataset import Dataset, claim
+from datasets.store.claim import claim
+from datasets.store.dataset import Dataset
+from datasets.store.lock import hold
 from eposit.arrays import Array
 from pipelines.paper.beyond.field_images import field_of_images
 from pipelines.paper.claims import Section, Table
@@ -45,8 +47,9 @@ def images(folder: Path, workers: int, tell: Callable[[str], None]) -> Section:
     """
     dataset, console = pictures(RECIPE, folder, workers, tell), Console(quiet=True)
     tell("images: estimates")
-    run_estimate(dataset, SETTINGS, workers, console)
-    run_score(dataset, workers, console)
+    with hold(dataset.root):
+        run_estimate(dataset, SETTINGS, workers, console)
+        run_score(dataset, workers, console)
     scores, cameras = dataset.read("scores"), dataset.read("frames", ["frame_id", "camera_name"])
     tables = tuple(
         _table(scores, cameras, title, take) for title, take in (("Mean errors", _mean), ("Medians", _median))
@@ -74,11 +77,12 @@ def wide(folder: Path, workers: int, tell: Callable[[str], None]) -> Section:
 def pictures(name: str, folder: Path, workers: int, tell: Callable[[str], None]) -> Dataset:
     """The dataset of a recipe that comes along, rendered and detected; what is there is kept."""
     recipe, text = load_recipe(name)
-    dataset, console = claim(folder, recipe, text), Console(quiet=True)
-    tell(f"{name}: rendering")
-    run_generate(dataset, workers, console)
-    tell(f"{name}: detection")
-    run_detect(dataset, workers, console)
+    console = Console(quiet=True)
+    with claim(folder, recipe, text) as dataset:
+        tell(f"{name}: rendering")
+        run_generate(dataset, workers, console)
+        tell(f"{name}: detection")
+        run_detect(dataset, workers, console)
     return dataset
 
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from datasets.rows import decode_image, of_detector, points_by_frame
 from datasets.schema import COMPONENTS
-from datasets.store.dataset import RECIPE_FILE, Dataset, write_text
+from datasets.store.atomic import write_text
+from datasets.store.dataset import RECIPE_FILE, Dataset
 from eposit.arrays import Array
 from pipelines.detection import Detector
 from pipelines.doctor import versions

@@ -13,9 +13,10 @@ from datasets.plan import Frame, plan, shard_count
 from datasets.recipe.model import Recipe
 from datasets.rows import pose_columns, table
 from datasets.schema import FRAMES, KEYPOINTS
-from datasets.store.dataset import Dataset, refused
+from datasets.store.dataset import Dataset
 from datasets.store.images import encode_png
 from datasets.store.linear_images import LinearImageError, linear_key, linear_path, read_linear, write_linear
+from datasets.store.refusals import refused
 from eposit.pose import tilt_rad
 from pipelines.engines.background import overlapped
 from render.frame import LinearImage, render_frame

@@ -11,7 +11,8 @@ from rich.console import Console
 
 from datasets.plan import plan
 from datasets.recipe.model import load_recipe
-from datasets.store.dataset import Dataset, claim
+from datasets.store.claim import claim
+from datasets.store.dataset import Dataset
 from eposit import Pose
 from eposit.arrays import Array
 from pipelines.detection import Detector
@@ -63,10 +64,11 @@ def dataset_in(folder: Path, tell: Callable[[str], None]) -> Dataset:
 
     recipe, text = load_recipe(RECIPE)
     tell(f"experiment: {len(plan(recipe))} pictures in {folder}")
-    dataset, quiet = claim(folder, recipe, text), Console(quiet=True)
-    stages.run_generate(dataset, 1, quiet)
-    for detector in DETECTORS:
-        stages.run_detect(dataset, 1, quiet, detector)
+    quiet = Console(quiet=True)
+    with claim(folder, recipe, text) as dataset:
+        stages.run_generate(dataset, 1, quiet)
+        for detector in DETECTORS:
+            stages.run_detect(dataset, 1, quiet, detector)
     return dataset
 
 
