@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 
+if TYPE_CHECKING:
+    from datasets.recipe.model import Recipe
+    from datasets.store.dataset import Dataset
 
-def load(recipe: str, regime: str | None) -> tuple[Any, str]:
+
+def load(recipe: str, regime: str | None) -> tuple[Recipe, str]:
     """A recipe and its text, with another regime if one is given.
 
     Raises:
@@ -24,7 +28,7 @@ def load(recipe: str, regime: str | None) -> tuple[Any, str]:
     return parse_recipe(text, f"recipe {recipe} with --regime {regime}"), text
 
 
-def begin(recipe: str, out: Path, regime: str | None, reuse: Path | None, console: Console) -> Any:
+def begin(recipe: str, out: Path, regime: str | None, reuse: Path | None, console: Console) -> Dataset:
     """The dataset of a recipe, begun or resumed in `out`, with linear light from `reuse` where it fits.
 
     Raises:
@@ -46,7 +50,7 @@ def begin(recipe: str, out: Path, regime: str | None, reuse: Path | None, consol
     return dataset
 
 
-def opened(folder: Path) -> Any:
+def opened(folder: Path) -> Dataset:
     """The dataset in a folder.
 
     Raises:

@@ -12,8 +12,8 @@ from threadpoolctl import threadpool_limits
 
 from datasets.errors import UserError
 from datasets.store.dataset import refused, write_text
-from pipelines.doctor import versions
 from pipelines.engines.local import check_workers
+from pipelines.machine import versions
 from pipelines.paper.claims import Claim, Drawing, Section
 
 PAGE, CLAIMS = "paper.html", "claims.md"

@@ -13,7 +13,7 @@ from datasets.schema import COMPONENTS
 from datasets.store.dataset import RECIPE_FILE, Dataset, write_text
 from eposit.arrays import Array
 from pipelines.detection import Detector
-from pipelines.doctor import versions
+from pipelines.machine import versions
 from pipelines.report import figures
 from pipelines.report.data import ERRORS, normalised_rows, score_rows, series
 from pipelines.report.points import field_rows, point_errors, tilt_rows
