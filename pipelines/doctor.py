@@ -2,66 +2,61 @@
 
 from __future__ import annotations
 
-import importlib.metadata
-import os
 import platform
+from dataclasses import dataclass
 from pathlib import Path
 
+from pipelines.machine import LIBRARIES, usable_cores, version_of
 from render import backend
 
-LIBRARIES = ("numpy", "scipy", "mitsuba", "drjit", "opencv-python-headless", "OpenEXR", "pyarrow")
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One thing that rendering and detection need."""
+
+    name: str
+    fine: bool
+    found: str  # or what to do
 
 
-def diagnose() -> list[tuple[str, bool, str]]:
-    """Name, whether it is fine, and what was found, for each thing that rendering and detection need."""
-    rows = [("python", True, f"{platform.python_version()} on {platform.system()} {platform.machine()}")]
-    rows += [_library(name) for name in LIBRARIES]
-    rows.append(_compiler())
+def diagnose() -> list[Check]:
+    """Every check; rendering is tried where nothing that it needs is missing."""
     gpu = backend.cuda_present()
-    rows.append(("CUDA GPU", True, "found: cuda_ad_mono is used" if gpu else "none: llvm_ad_mono is used"))
-    rows.append(("cores", True, str(os.cpu_count())))
-    rows.append(_lab())
-    if all(fine for _, fine, _ in rows):
-        rows.append(_render())
-    return rows
+    checks = [
+        Check("python", True, f"{platform.python_version()} on {platform.system()} {platform.machine()}"),
+        *map(_library, LIBRARIES),
+        _compiler(),
+        Check("CUDA GPU", True, "found: cuda_ad_mono is used" if gpu else "none: llvm_ad_mono is used"),
+        Check("cores", True, str(usable_cores())),
+        _names(),
+    ]
+    return [*checks, _render()] if all(check.fine for check in checks) else checks
 
 
-def versions() -> str:
-    """Libraries and machine in one line."""
-    found = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in LIBRARIES)
-    system = f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores"
-    return f"Python {platform.python_version()}, {found}; {system}"
+def _library(name: str) -> Check:
+    version = version_of(name)
+    return Check(name, version is not None, version or "not installed; run `make setup`")
 
 
-def _library(name: str) -> tuple[str, bool, str]:
-    try:
-        return name, True, importlib.metadata.version(name)
-    except importlib.metadata.PackageNotFoundError:
-        return name, False, "not installed; run `make setup`"
-
-
-def _compiler() -> tuple[str, bool, str]:
+def _compiler() -> Check:
     try:
         library = backend.find_llvm()
     except backend.BackendError as error:
-        return "LLVM", False, str(error)
-    return "LLVM", True, f"{backend.llvm_version(library)} ({library.name})"
+        return Check("LLVM", False, str(error))
+    return Check("LLVM", True, f"{backend.llvm_version(library)} ({library.name})")
 
 
-def _lab() -> tuple[str, bool, str]:
+def _names() -> Check:
     """The names `datasets` and `render` belong to other packages too: ours must be the ones that are imported."""
     import datasets
 
     ours = Path(__file__).resolve().parents[1]
-    fine = Path(datasets.__file__ or "").resolve().is_relative_to(ours)
-    return (
-        "datasets",
-        fine,
-        "from this checkout" if fine else f"{datasets.__file__} is another package; use a venv of its own",
-    )
+    if Path(datasets.__file__ or "").resolve().is_relative_to(ours):
+        return Check("datasets", True, "from this checkout")
+    return Check("datasets", False, f"{datasets.__file__} is another package; use a venv of its own")
 
 
-def _render() -> tuple[str, bool, str]:
+def _render() -> Check:
     from datasets.plan import plan
     from datasets.recipe.model import load_recipe
     from render.frame import render_frame
@@ -69,9 +64,9 @@ def _render() -> tuple[str, bool, str]:
     recipe, _ = load_recipe("smoke")
     frame = plan(recipe)[0]
     try:
-        master = render_frame(
+        linear = render_frame(
             recipe.target, recipe.light, frame.camera.true_camera(), frame.cam_from_obj, samples=4, seed=0
         )
     except backend.BackendError as error:
-        return "rendering", False, str(error)
-    return "rendering", True, f"a region of {master.region[2]} x {master.region[3]} px came out"
+        return Check("rendering", False, str(error))
+    return Check("rendering", True, f"a region of {linear.region[2]} x {linear.region[3]} px came out")

@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from datasets.recipe.model import Recipe
 from pipelines.bench.cases import chosen_frames, image_of
-from pipelines.bench.table import Row, compared
+from pipelines.bench.table import Figure, Row, compared
 from pipelines.bench.timing import Times, in_turn, total
 from pipelines.detection import SUBPIX_STOP, SUBPIX_WINDOW, detect_points
 from pipelines.detection.finders import SECTOR_FLAGS
 from render.targets.chessboard import Target
 
 PART = "detection"
+NAMES = ("findChessboardCorners, cornerSubPix", "findChessboardCornersSB, exhaustive, accuracy")
 Grey = NDArray[np.uint8]
 
 
@@ -29,9 +30,14 @@ def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
         calls = [_ours, classic, sector_based]
         times = [in_turn(*(functools.partial(call, image, recipe.target) for call in calls)) for image in images]
         sums.append([total(list(column)) for column in zip(*times, strict=True)])
-        yield from _rows(camera, sums[-1], [_found(call, images, recipe.target) for call in calls], len(images))
+        yield from _rows(camera, sums[-1], len(images))
+        ours, *theirs = (_found(call, images, recipe.target) for call in calls)
+        told = " and ".join(map(str, theirs))
+        yield Figure(
+            PART, f"{camera}: boards found of {len(images)}", str(ours), f"found by {' and '.join(NAMES)}", told
+        )
     every = [total(list(column)) for column in zip(*sums, strict=True)]
-    yield from _rows("one picture of each camera", every, None, poses)
+    yield from _rows("one picture of each camera", every, poses)
 
 
 def classic(image: Grey, target: Target) -> bool:
@@ -55,13 +61,6 @@ def _found(call: Callable[[Grey, Target], bool], images: list[Grey], target: Tar
     return sum(call(image, target) for image in images)
 
 
-def _rows(name: str, times: list[Times], found: list[int] | None, count: int) -> Iterator[Row]:
-    names = [
-        "corners and circle",
-        "findChessboardCorners, cornerSubPix",
-        "findChessboardCornersSB, exhaustive, accuracy",
-    ]
-    if found is not None:
-        names = [f"{text} (found {seen} of {count})" for text, seen in zip(names, found, strict=True)]
-    for other, that in zip(names[1:], times[1:], strict=True):
-        yield compared(PART, f"{name}: {names[0]}", times[0], other, that, count)
+def _rows(name: str, times: list[Times], count: int) -> Iterator[Row]:
+    for other, that in zip(NAMES, times[1:], strict=True):
+        yield compared(PART, f"{name}: corners and circle", times[0], other, that, count)

@@ -9,7 +9,7 @@ from datasets.plan import Frame
 from datasets.recipe.model import Recipe
 from pipelines.bench.cases import chosen_frames, corner_errors, linear_of, over_background, rms
 from pipelines.bench.frame import frame_of_ours, plain
-from pipelines.bench.table import Row, compared, noted
+from pipelines.bench.table import Figure, Row, compared
 from pipelines.bench.timing import in_turn
 from render.frame import LinearImage
 from render.region import target_region
@@ -27,11 +27,11 @@ def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
     """
     frames = chosen_frames(recipe, POSES)[recipe.cameras[-1].name]
     ours = rms([corner_errors(recipe, frame, linear_of(recipe, frame)) for frame in frames])
-    yield noted(PART, f"{frames[0].camera.name}: corners, ours", f"{ours:.4f} px RMS")
+    yield Figure(PART, f"{frames[0].camera.name}: corners, ours", f"{ours:.4f} px RMS")
     needed = SAMPLES[-1]
     for samples in SAMPLES:
         theirs = rms([corner_errors(recipe, frame, _plain_master(recipe, frame, samples)) for frame in frames])
-        yield noted(PART, f"corners, plain script, {samples} samples", f"{theirs:.4f} px RMS")
+        yield Figure(PART, f"corners, plain script, {samples} samples", f"{theirs:.4f} px RMS")
         if theirs <= ours:
             needed = samples
             break

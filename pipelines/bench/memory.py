@@ -11,7 +11,7 @@ from datasets.plan import frame_count, shard_count
 from datasets.recipe.model import Recipe
 from datasets.store.dataset import Dataset
 from pipelines.bench.cases import scaled
-from pipelines.bench.table import Row, noted
+from pipelines.bench.table import Figure, Row
 from pipelines.detection import Detector
 from pipelines.stages import detect, generate
 
@@ -42,8 +42,8 @@ def measure(recipe: Recipe, frames: int, advance: Callable[[int], None] = lambda
                     break
     first, before = settled or (done, resident_mb())
     after = resident_mb()
-    yield noted(PART, f"resident after {first} frames", f"{before:.0f} MB")
-    yield noted(PART, f"resident after {done} frames", f"{after:.0f} MB", "growth", f"{after - before:+.1f} MB")
+    yield Figure(PART, f"resident after {first} frames", f"{before:.0f} MB")
+    yield Figure(PART, f"resident after {done} frames", f"{after:.0f} MB", "", f"{after - before:+.1f} MB")
 
 
 def resident_mb() -> float:

@@ -15,7 +15,7 @@ from datasets.store.images import encode_png
 from datasets.store.linear_images import write_linear
 from pipelines.bench.cases import chosen_poses, linear_of, scaled
 from pipelines.bench.end_to_end import by_pose, run_stages
-from pipelines.bench.table import Row, noted
+from pipelines.bench.table import Figure, Row, short
 from pipelines.bench.timing import in_turn
 from pipelines.detection import detect_points
 from render.sensor.develop import develop
@@ -30,24 +30,24 @@ def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
     staged = by_pose(recipe)
     runs = [functools.partial(run_stages, staged, chosen_poses(recipe, count)) for count in POSES]
     cameras = len(recipe.cameras)
-    yield _row("all stages, with frames", [cameras * count for count in POSES], runs)
+    yield _row("all stages at {} frames", [cameras * count for count in POSES], runs)
     for camera in (recipe.cameras[0].name, recipe.cameras[-1].name):
         sizes = [scaled(recipe, factor) for factor in SCALES]
         pixels = [size.cameras[0].width * size.cameras[0].height for size in sizes]
         yield _row(
-            f"{camera}: frame without detection, with pixels",
+            camera + ": frame without detection at {} pixels",
             pixels,
             [functools.partial(_frame, size, camera) for size in sizes],
         )
         images = [_image(size, camera) for size in sizes]
         yield _row(
-            f"{camera}: detection, with pixels",
+            camera + ": detection at {} pixels",
             pixels,
             [functools.partial(detect_points, image, recipe.target) for image in images],
         )
         frame = next(frame for frame in plan(recipe) if frame.camera.name == camera)
         yield _row(
-            f"{camera}: render, with samples",
+            camera + ": render at {} samples",
             SAMPLES,
             [functools.partial(linear_of, recipe, frame, samples) for samples in SAMPLES],
         )
@@ -59,11 +59,13 @@ def exponent(sizes: Sequence[float], seconds: Sequence[float]) -> float:
 
 
 def _row(what: str, sizes: Sequence[float], calls: Sequence[Callable[[], object]]) -> Row:
+    """what: says what was measured, with a place for the sizes."""
     times = in_turn(*calls)
-    spent = " / ".join(f"{1e3 * time.wall:.3g}" for time in times)
     slope = exponent(sizes, [time.cpu for time in times])
-    at = " / ".join(f"{size:g}" for size in sizes)
-    return noted(PART, what, spent, f"at {at}", f"exponent {slope:.2f}")
+    spent = " / ".join(short(1e3 * time.wall) for time in times)
+    return Figure(
+        PART, what.format(" / ".join(f"{size:g}" for size in sizes)), f"{spent} ms", "", f"exponent {slope:.2f}"
+    )
 
 
 def _frame(recipe: Recipe, camera: str) -> None:

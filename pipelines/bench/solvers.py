@@ -22,7 +22,7 @@ from pipelines.adapters.registry import find_solver
 from pipelines.bench.table import Row, compared
 from pipelines.bench.timing import Times, in_turn
 
-PART = "solver"
+PART = "solver, a pose of four points"
 POINTS = np.array([(0.0, 0.0, 0.0), (200.0, 0.0, 0.0), (0.0, 200.0, 0.0), (0.0, 0.0, -50.0)])  # mm, the paper's object
 CAMERA = Camera(
     lens="perspective", fx=1378.65, fy=1381.37, cx=807.41661, cy=602.4737, width=1600, height=1200
@@ -67,10 +67,10 @@ def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
     with threadpool_limits(1):
         for solver in solvers():
             single = functools.partial(_each_alone, solver, pixels[:SINGLE])
-            yield from _rows(f"{solver.name}, 4 points, single call, a pose", single, SINGLE, loops)
+            yield from _rows(f"{solver.name}, single call", single, SINGLE, loops)
             if solver.batch:
                 batch, name = functools.partial(solver.call, POINTS, pixels[: solver.batch], CAMERA), solver.name
-                yield from _rows(f"{name}, 4 points, batch of {solver.batch}, a pose", batch, solver.batch, loops)
+                yield from _rows(f"{name}, batch of {solver.batch}", batch, solver.batch, loops)
 
 
 def draws(count: int) -> Array:

@@ -1,11 +1,9 @@
-"""The one table of all measurements, for the terminal and as Markdown."""
+"""What was measured, as data and as Markdown: comparisons of two times, and single figures."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-
-from rich.table import Table
 
 from pipelines.bench.timing import Times
 
@@ -13,41 +11,52 @@ TITLES = ("part", "ours", "ours, ms", "compared with", "that, ms", "ratio", "rat
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
-    """One measurement; ratios say how many of ours fit into one of the other."""
+class Comparison:
+    """Two times, measured in turn; ratios say how many of ours fit into one of the other."""
 
     part: str
     ours: str
-    ours_ms: str
+    ours_ms: float
     other: str
-    other_ms: str
-    ratio: str
-    cpu_ratio: str
+    other_ms: float
+    ratio: float
+    cpu_ratio: float
 
     def cells(self) -> tuple[str, ...]:
         """The cells in the order of TITLES."""
-        return self.part, self.ours, self.ours_ms, self.other, self.other_ms, self.ratio, self.cpu_ratio
+        return (
+            self.part, self.ours, short(self.ours_ms), self.other, short(self.other_ms), short(self.ratio),
+            short(self.cpu_ratio),
+        )  # fmt: skip
 
 
-def compared(part: str, ours: str, own: Times, other: str, that: Times, count: int = 1) -> Row:
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A figure that is no comparison of two times, with the other's figure or what follows from it, if there is one."""
+
+    part: str
+    ours: str
+    figure: str
+    other: str = ""
+    value: str = ""
+
+    def cells(self) -> tuple[str, ...]:
+        """The cells in the order of TITLES: `value` stands in the column of ratios."""
+        return self.part, self.ours, self.figure, self.other, "", self.value, ""
+
+
+Row = Comparison | Figure
+
+
+def compared(part: str, ours: str, own: Times, other: str, that: Times, count: int = 1) -> Comparison:
     """A comparison of two times, both shown per one of `count`."""
-    wall, cpu = that.wall / own.wall, that.cpu / max(own.cpu, 1e-9)
-    return Row(part, ours, _ms(own, count), other, _ms(that, count), f"{wall:.3g}", f"{cpu:.3g}")
+    own_ms, that_ms = (1e3 * times.wall / count for times in (own, that))
+    return Comparison(part, ours, own_ms, other, that_ms, that.wall / own.wall, that.cpu / max(own.cpu, 1e-9))
 
 
-def noted(part: str, ours: str, figure: str, other: str = "", value: str = "") -> Row:
-    """A figure that is no comparison of two times; `value` stands in the column of ratios."""
-    return Row(part, ours, figure, other, "", value, "")
-
-
-def terminal(rows: Iterable[Row], title: str) -> Table:
-    """The table for Rich."""
-    table = Table(box=None, title=title, title_justify="left")
-    for name in TITLES:
-        table.add_column(name, justify="left" if name in ("part", "ours", "compared with") else "right")
-    for row in rows:
-        table.add_row(*row.cells())
-    return table
+def short(number: float) -> str:
+    """Three significant digits, and all digits of what is larger."""
+    return f"{number:.0f}" if abs(number) >= 1000.0 else f"{number:.3g}"
 
 
 def markdown(rows: Sequence[Row], facts: Iterable[tuple[str, str]]) -> str:
@@ -57,7 +66,3 @@ def markdown(rows: Sequence[Row], facts: Iterable[tuple[str, str]]) -> str:
     lines += ["", f"| {' | '.join(TITLES)} |", "|---|---|--:|---|--:|--:|--:|"]
     lines += [f"| {' | '.join(row.cells())} |" for row in rows]
     return "\n".join(lines) + "\n"
-
-
-def _ms(times: Times, count: int) -> str:
-    return f"{1e3 * times.wall / count:.3g}"

@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 
+if TYPE_CHECKING:
+    from datasets.recipe.model import Recipe
+    from datasets.store.dataset import Dataset
 
-def load(recipe: str, regime: str | None) -> tuple[Any, str]:
+
+def load(recipe: str, regime: str | None) -> tuple[Recipe, str]:
     """A recipe and its text, with another regime if one is given.
 
     Raises:
@@ -27,7 +31,7 @@ def load(recipe: str, regime: str | None) -> tuple[Any, str]:
 
 
 @contextmanager
-def begin(recipe: str, out: Path, regime: str | None, reuse: Path | None, console: Console) -> Iterator[Any]:
+def begin(recipe: str, out: Path, regime: str | None, reuse: Path | None, console: Console) -> Iterator[Dataset]:
     """The dataset of a recipe, begun or resumed in `out`, with linear light from `reuse` where it fits.
 
     Nobody else writes it while the body runs.
@@ -53,7 +57,7 @@ def begin(recipe: str, out: Path, regime: str | None, reuse: Path | None, consol
 
 
 @contextmanager
-def writing(folder: Path) -> Iterator[Any]:
+def writing(folder: Path) -> Iterator[Dataset]:
     """The dataset in a folder; nobody else writes it while the body runs.
 
     Raises:
@@ -66,7 +70,7 @@ def writing(folder: Path) -> Iterator[Any]:
         yield dataset
 
 
-def opened(folder: Path) -> Any:
+def opened(folder: Path) -> Dataset:
     """The dataset in a folder.
 
     Raises:

@@ -13,6 +13,7 @@ RecipeName = Annotated[str, typer.Argument(metavar="RECIPE", help="A .toml file,
 ShownRecipe = Annotated[str | None, typer.Argument(metavar="[RECIPE]", help="Show its values beside the keys.")]
 Workers = Annotated[int, typer.Option(help="Processes; the result is the same for any number.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON, for machines, instead of text.")]
 Regime = Annotated[
     str | None, typer.Option(help="Sensor regime, as if the recipe said so: clean, typical, paper or harsh.")
 ]

@@ -2,39 +2,49 @@
 
 from __future__ import annotations
 
+import itertools
+from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
 from datasets.errors import UserError
 from pipelines.commands import options as o
 from pipelines.commands.opening import load, opened
+from pipelines.commands.tables import Column, Footnotes, print_footnotes, print_json, print_keys, print_table
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pipelines.bench.table import Comparison, Figure, Row
 
 
-def verify(folder: o.Folder) -> None:
+def verify(folder: o.Folder, json: o.Json = False) -> None:
     """Check every shard and master, and print the hash of the content."""
     from datasets.store.verify import verify as check
 
     digest, problems = check(opened(folder))
+    if json:
+        print_json({"content": digest, "problems": problems})
     if problems:
         more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
         raise UserError(f"{problems[0]}{more}")
-    typer.echo(f"content {digest}")
+    if not json:
+        typer.echo(f"content {digest}")
 
 
-def doctor() -> None:
+def doctor(json: o.Json = False) -> None:
     """Tell what this machine has and what is missing."""
     from pipelines.doctor import diagnose
 
-    rows = diagnose()
-    table = Table(box=None, show_header=False)
-    for name, fine, found in rows:
-        table.add_row("ok" if fine else "MISSING", name, found)
-    Console().print(table)
-    if not all(fine for _, fine, _ in rows):
+    checks = diagnose()
+    if json:
+        print_json([asdict(check) for check in checks])
+    else:
+        rows = [("ok" if check.fine else "MISSING", check.name, check.found) for check in checks]
+        print_table((Column("state"), Column("what"), Column("found")), rows)
+    if not all(check.fine for check in checks):
         raise UserError("something that rendering needs is missing; see the lines marked MISSING")
 
 
@@ -45,11 +55,56 @@ def bench(
     memory: o.Memory = None,
     out: o.Markdown = None,
     regime: o.Regime = None,
+    json: o.Json = False,
 ) -> None:
     """Speed as ratios measured side by side, and memory over a long run."""
-    from pipelines.bench.command import bench as measure
+    from datasets.store.dataset import write_text
+    from pipelines.bench.command import measured
+    from pipelines.bench.table import Comparison, Figure, markdown
+    from pipelines.machine import facts
 
-    measure(load(recipe, regime)[0], poses, only or [], memory, out)
+    rows = measured(load(recipe, regime)[0], poses, only or [], memory)
+    times = [row for row in rows if isinstance(row, Comparison)]
+    figures = [row for row in rows if isinstance(row, Figure)]
+    if json:
+        told = {"machine": dict(facts()), "times": [*map(asdict, times)], "figures": [*map(asdict, figures)]}
+        print_json(told)
+    else:
+        _print_measured(times, figures, facts())
+    if out is not None:
+        write_text(out, markdown(rows, facts()))
+
+
+def _print_measured(times: list[Comparison], figures: list[Figure], machine: list[tuple[str, str]]) -> None:
+    from pipelines.bench.table import short
+
+    notes = Footnotes()
+    if times:
+        titles = ("ours, ms", "other, ms", "", "ratio", "CPU")
+        cells = [
+            (short(row.ours_ms), short(row.other_ms), notes.mark(row.other), short(row.ratio), short(row.cpu_ratio))
+            for row in times
+        ]
+        _print_by_part("times", titles, times, cells, notes)
+    if times and figures:
+        typer.echo()
+    if figures:
+        texts = [(row.figure, row.value, notes.mark(row.other)) for row in figures]
+        _print_by_part("figures", ("ours", "other", ""), figures, texts, notes)
+    print_footnotes(notes)
+    typer.echo("\nratio: how many of ours fit into one of the other\nCPU: the same ratio of processor times\n")
+    print_keys((name, value, "") for name, value in machine)
+
+
+def _print_by_part(
+    title: str, titles: Sequence[str], rows: Sequence[Row], cells: Sequence[tuple[str, ...]], notes: Footnotes
+) -> None:
+    """A table with a line for each part and its rows indented below. cells: those behind each row's name."""
+    shown: list[tuple[str, ...]] = []
+    for part, group in itertools.groupby(zip(rows, cells, strict=True), lambda pair: pair[0].part):
+        shown.append((part, *[""] * len(titles)))
+        shown += [(f"  {row.ours}", *cell) for row, cell in group]
+    print_table((Column(title), *(Column(name, number=True) for name in titles)), shown, notes)
 
 
 def paper(
@@ -66,40 +121,39 @@ def paper(
         typer.echo(path)
 
 
-def recipes() -> None:
+def recipes(json: o.Json = False) -> None:
     """List the recipes that come with the package."""
     from datasets.plan import frame_count
     from datasets.recipe.model import load_recipe, recipe_names
 
-    table = Table(box=None)
-    for title in ("name", "frames", "description"):
-        table.add_column(title)
-    for name in recipe_names():
-        recipe, _ = load_recipe(name)
-        table.add_row(name, str(frame_count(recipe)), recipe.description)
-    Console().print(table)
+    found = [load_recipe(name)[0] for name in recipe_names()]
+    rows = [(name, frame_count(recipe), recipe.description) for name, recipe in zip(recipe_names(), found, strict=True)]
+    if json:
+        print_json([dict(zip(("name", "frames", "description"), row, strict=True)) for row in rows])
+        return
+    columns = (Column("name"), Column("frames", number=True), Column("description"))
+    print_table(columns, [(name, str(frames), description) for name, frames, description in rows])
 
 
-def describe(recipe: o.ShownRecipe = None) -> None:
+def describe(recipe: o.ShownRecipe = None, json: o.Json = False) -> None:
     """Every key of a recipe with its meaning: its defaults and the sensor's regimes, or a recipe's values."""
     from datasets.recipe.model import describe as keys
     from datasets.recipe.model import load_recipe, values
     from render.sensor.presets import regime_rows, regimes
 
-    rows = [(key, default, meaning) for key, default, meaning in keys()]
+    rows, names = list(keys()), tuple(regimes())
     if recipe:
         given = values(load_recipe(recipe)[0])
         rows = [(key, given[key], meaning) for key, _, meaning in rows if key in given]
-    _print_table(("key", "value" if recipe else "default", "meaning"), rows)
+    if json:
+        titles = ("key", "value" if recipe else "default", "meaning")
+        told: dict[str, object] = {"keys": [dict(zip(titles, row, strict=True)) for row in rows]}
+        if not recipe:
+            told["regimes"] = {f"sensor.{key}": dict(zip(names, row, strict=True)) for key, row in regime_rows()}
+        print_json(told)
+        return
+    print_keys(rows)
     if not recipe:
         typer.echo("\nThe sensor's regimes:\n")
-        _print_table(("key", *regimes()), [(f"sensor.{key}", *map(str, row)) for key, row in regime_rows()])
-
-
-def _print_table(titles: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
-    table = Table(box=None)
-    for title in titles:
-        table.add_column(title, overflow="fold")
-    for row in rows:
-        table.add_row(*map(escape, row))
-    Console().print(table)
+        columns = (Column("key"), *(Column(name, number=True) for name in names))
+        print_table(columns, [(f"sensor.{key}", *map(str, row)) for key, row in regime_rows()])

@@ -13,8 +13,8 @@ from threadpoolctl import threadpool_limits
 from datasets.errors import UserError
 from datasets.store.atomic import write_text
 from datasets.store.refusals import refused
-from pipelines.doctor import versions
 from pipelines.engines.local import check_workers
+from pipelines.machine import versions
 from pipelines.paper.claims import Claim, Drawing, Section
 
 PAGE, CLAIMS = "paper.html", "claims.md"

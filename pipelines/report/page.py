@@ -14,7 +14,7 @@ from datasets.store.atomic import write_text
 from datasets.store.dataset import RECIPE_FILE, Dataset
 from eposit.arrays import Array
 from pipelines.detection import Detector
-from pipelines.doctor import versions
+from pipelines.machine import versions
 from pipelines.report import figures
 from pipelines.report.data import ERRORS, normalised_rows, score_rows, series
 from pipelines.report.points import field_rows, point_errors, tilt_rows

@@ -25,7 +25,7 @@ from datasets.recipe.model import Recipe
 from pipelines.bench.blender.scene import LENS, description
 from pipelines.bench.cases import chosen_frames, corner_errors, linear_of, over_background, rms
 from pipelines.bench.frame import frame_of_ours
-from pipelines.bench.table import Row, compared, noted
+from pipelines.bench.table import Figure, Row, compared
 from pipelines.bench.timing import Times, in_turn, mean_of
 from render import backend
 from render.frame import LinearImage
@@ -169,6 +169,6 @@ def _checks(recipe: Recipe, frame: Frame, ours: LinearImage, theirs: LinearImage
     """Whether both show the same: corners against truth, and light."""
     name, rays = frame.camera.name, f"Cycles {version}, {SAMPLES} rays"
     own, that = (rms([corner_errors(recipe, frame, linear)]) for linear in (ours, theirs))
-    yield noted(PART, f"{name}: corners, ours", f"{own:.4f} px RMS", f"corners, {rays}", f"{that:.4f} px RMS")
+    yield Figure(PART, f"{name}: corners, ours", f"{own:.4f} px RMS", f"corners, {rays}", f"{that:.4f} px RMS")
     light = float(theirs.radiance.mean() / ours.radiance.mean())
-    yield noted(PART, f"{name}: mean light of the region", "1", f"mean light, {rays}", f"{light:.4f}")
+    yield Figure(PART, f"{name}: mean light of the region", "1", f"mean light, {rays}", f"{light:.4f}")

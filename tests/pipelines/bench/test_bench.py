@@ -8,12 +8,12 @@ from datasets.plan import plan
 from datasets.recipe.model import load_recipe
 from pipelines.bench.cases import scaled
 from pipelines.bench.command import parts
-from pipelines.bench.machine import LIBRARIES, facts
 from pipelines.bench.primary_rays import RAYS, primary_rays
 from pipelines.bench.scaling import exponent
 from pipelines.bench.solvers import CAMERA, POINTS, draws, solvers
 from pipelines.bench.table import TITLES, compared, markdown
 from pipelines.bench.timing import Times, in_turn, total
+from pipelines.machine import LIBRARIES, facts
 from render.region import target_region
 
 
@@ -64,7 +64,7 @@ def test_a_scaled_camera_sees_the_same_in_other_pixels():
 def test_the_command_measures_and_writes(cli, tmp_path):
     outcome = cli("bench", "smoke", "--only", "render", "--poses", 1, "--out", tmp_path / "new" / "bench.md")
     assert outcome.code == 0
-    assert "one render of each camera" in outcome.out  # on the bar; the table is folded to the terminal
+    assert "one render of each camera" in outcome.out  # on the bar; and in the table
     assert (tmp_path / "new" / "bench.md").read_text().count("| render |") == 4  # three cameras and their sum
     outcome = cli("bench", "smoke", "--memory", 6, "--out", tmp_path / "memory.md")
     assert outcome.code == 0
