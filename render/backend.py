@@ -20,6 +20,9 @@ MINIMUM_LLVM = 19
 CPU_VARIANT = "llvm_ad_mono"
 CUDA_VARIANT = "cuda_ad_mono"
 VARIANTS = (CPU_VARIANT, CUDA_VARIANT)
+SYSTEM_FOLDERS = (  # below /, with wildcards
+    "usr/lib", "usr/local/lib", "opt/homebrew/opt/llvm/lib", "usr/lib/*-linux-gnu*", "usr/lib/llvm-*/lib",
+)  # fmt: skip
 LIBRARY_VARIABLE = "DRJIT_LIBLLVM_PATH"
 ADVICE = (
     f"install one with `pip install karellen-llvm-core`, or set {LIBRARY_VARIABLE} to libLLVM {MINIMUM_LLVM} or later"
@@ -31,16 +34,17 @@ class BackendError(RuntimeError):
 
 
 def llvm_version(library: Path) -> int | None:
-    """Major version that an LLVM shared library reports, or None if it cannot be loaded as one."""
-    try:
-        handle = ctypes.CDLL(str(library))
-    except OSError:
-        return None
+    """Major version that an LLVM shared library reports; None for a library that is not LLVM.
+
+    Raises:
+        OSError: the library cannot be loaded: it is damaged, or a library that it needs is missing.
+    """
+    handle = ctypes.CDLL(str(library))
     try:
         major = ctypes.c_uint()
         handle.LLVMGetVersion(ctypes.byref(major), None, None)
         return int(major.value)
-    except AttributeError:  # LLVM tells its version since 16
+    except AttributeError:  # LLVM states its version since 16
         return _version_in_name(library)
 
 
@@ -48,18 +52,21 @@ def find_llvm() -> Path:
     """The LLVM library to use: the one the user names, the PyPI wheel's, then the newest of the system.
 
     Raises:
-        BackendError: the named one is missing or too old, or none is found.
+        BackendError: the named one is missing, too old or cannot be loaded, or no usable one is found.
     """
     named = os.environ.get(LIBRARY_VARIABLE)
     if named:
-        return _checked_choice(Path(named))
-    tried: list[str] = []
+        problem = _problem_of(Path(named))
+        if problem:
+            raise BackendError(f"{LIBRARY_VARIABLE} names {named!r}, which {problem}; {ADVICE}")
+        return Path(named)
+    refused: list[str] = []
     for library in _candidates():
-        version = _version_in_name(library)
-        if version is not None and version >= MINIMUM_LLVM:
+        problem = _problem_of(library)
+        if problem is None:
             return library
-        tried.append(f"{library.name}")
-    found = f"found only {', '.join(tried)}" if tried else "found none"
+        refused.append(f"{library.name}, which {problem}")
+    found = f"found only {'; '.join(dict.fromkeys(refused))}" if refused else "found none"
     raise BackendError(f"rendering needs LLVM {MINIMUM_LLVM} or later and {found}; {ADVICE}")
 
 
@@ -108,22 +115,29 @@ def jit() -> Any:
     return drjit
 
 
-def _checked_choice(library: Path) -> Path:
+def _problem_of(library: Path) -> str | None:
+    """Why a library cannot compile our kernels, as the end of a sentence; None if it can.
+
+    A library whose name states an old version is not loaded: its symbols have no place beside a new one's.
+    """
     if not library.is_file():
-        raise BackendError(f"{LIBRARY_VARIABLE} names {str(library)!r}, which is not a file; {ADVICE}")
-    version = llvm_version(library)
+        return "is not a file"
+    version = _version_in_name(library)
+    if version is None or version >= MINIMUM_LLVM:
+        try:
+            version = llvm_version(library)
+        except OSError as error:
+            return f"cannot be loaded ({error})"
     if version is None:
-        raise BackendError(f"{LIBRARY_VARIABLE} names {str(library)!r}, which is not an LLVM library; {ADVICE}")
-    if version < MINIMUM_LLVM:
-        raise BackendError(f"{LIBRARY_VARIABLE} names LLVM {version}, which would abort the process; {ADVICE}")
-    return library
+        return "is not an LLVM library"
+    return f"is LLVM {version} and would abort the process" if version < MINIMUM_LLVM else None
 
 
 def _candidates() -> Iterator[Path]:
     """Libraries of the PyPI wheel, then of the system, newest first."""
-    system = [Path(directory) for directory in ("/usr/lib", "/usr/local/lib", "/opt/homebrew/opt/llvm/lib")]
-    system += sorted(Path("/usr/lib").glob("*-linux-gnu*")) + sorted(Path("/usr/lib").glob("llvm-*/lib"))
-    for directories in ([Path(sys.prefix) / "lib", Path(sys.prefix) / "bin"], system):
+    packages = [Path(sys.prefix) / "lib", Path(sys.prefix) / "bin"]
+    system = [directory for pattern in SYSTEM_FOLDERS for directory in sorted(Path("/").glob(pattern))]
+    for directories in (packages, system):
         found = [path for directory in directories for path in directory.glob("libLLVM*") if _version_in_name(path)]
         found += [path for directory in directories for path in directory.glob("LLVM-C.dll")]
         yield from sorted(found, key=lambda path: (_version_in_name(path) or 0, str(path)), reverse=True)

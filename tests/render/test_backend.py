@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import pytest
 
 from render import backend
@@ -35,13 +37,20 @@ def old_llvm(place):
     return fake_library("libLLVM.so")(place)
 
 
+def other_library(place):
+    """A library that can be loaded and is not LLVM."""
+    place.patch.setattr(backend, "llvm_version", lambda library: None)
+    return fake_library("libother.so")(place)
+
+
 CASES = {
-    "old LLVM": (environment(backend.LIBRARY_VARIABLE, old_llvm), "names LLVM 14, which would abort the process"),
+    "old LLVM": (environment(backend.LIBRARY_VARIABLE, old_llvm), "which is LLVM 14 and would abort the process"),
     "missing LLVM": (environment(backend.LIBRARY_VARIABLE, "nowhere/libLLVM.so"), "which is not a file"),
-    "LLVM is no library": (
+    "LLVM cannot be loaded": (
         environment(backend.LIBRARY_VARIABLE, fake_library("libLLVM-20.so")),
-        "which is not an LLVM library",
+        "libLLVM-20.so', which cannot be loaded (",
     ),
+    "no LLVM": (environment(backend.LIBRARY_VARIABLE, other_library), "which is not an LLVM library"),
     "unknown variant": (environment("EPOSIT_VARIANT", "scalar_rgb"), "EPOSIT_VARIANT is 'scalar_rgb'; it must be one"),
 }
 
@@ -53,9 +62,9 @@ def test_an_unusable_compiler_gives_one_sentence(name, place, cli):
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_an_unusable_compiler_in_a_process_of_its_own(workers, place):
-    library = {backend.LIBRARY_VARIABLE: fake_library("libLLVM-14.so")(place), "EPOSIT_VARIANT": backend.CPU_VARIANT}
+    library = {backend.LIBRARY_VARIABLE: fake_library("libLLVM.so")(place), "EPOSIT_VARIANT": backend.CPU_VARIANT}
     done = alone("generate", place.recipe(), "--out", place.new(), "--workers", workers, **library)
-    assert_one_sentence(done.returncode, done.stderr, "which is not an LLVM library")
+    assert_one_sentence(done.returncode, done.stderr, "which cannot be loaded")
 
 
 def test_doctor_names_the_unusable_compiler(place, cli):
@@ -63,3 +72,46 @@ def test_doctor_names_the_unusable_compiler(place, cli):
     outcome = cli("doctor")
     assert_one_sentence(outcome.code, outcome.err, "see the lines marked MISSING")
     assert "MISSING  LLVM" in outcome.out
+
+
+@pytest.fixture
+def installed(place):
+    """Puts fake libraries where those of Python packages lie, and lets the ones named sound be loaded."""
+
+    def install(*names, sound):
+        def version(library):
+            if library.name not in sound:
+                raise OSError("libc++.so.1: cannot open shared object file")
+            return sound[library.name]
+
+        place.patch.delenv(backend.LIBRARY_VARIABLE, raising=False)
+        place.patch.setattr(sys, "prefix", str(place.folder))
+        place.patch.setattr(backend, "SYSTEM_FOLDERS", ())
+        place.patch.setattr(backend, "llvm_version", version)
+        (place.folder / "lib").mkdir()
+        for name in names:
+            fake_library(f"lib/{name}")(place)
+
+    return install
+
+
+def test_the_newest_compiler_is_chosen(installed):
+    installed("libLLVM-19.so", "libLLVM.so.21.1", "libLLVM-20.so", sound={"libLLVM-19.so": 19, "libLLVM.so.21.1": 21})
+    assert backend.find_llvm().name == "libLLVM.so.21.1"
+
+
+def test_a_compiler_that_cannot_be_loaded_is_passed_over(installed):
+    installed("libLLVM-19.so", "libLLVM.so.21.1", "libLLVM-14.so", sound={"libLLVM-19.so": 19})
+    assert backend.find_llvm().name == "libLLVM-19.so"
+
+
+def test_without_a_usable_compiler_rendering_ends_in_one_sentence(installed, place, cli):
+    installed("libLLVM.so.21.1", "libLLVM-14.so", sound={})
+    place.patch.setattr(backend, "load", backend.load.__wrapped__)
+    place.patch.setenv("EPOSIT_VARIANT", backend.CPU_VARIANT)
+    place.patch.delitem(sys.modules, "drjit", raising=False)
+    outcome = cli("generate", place.recipe(), "--out", place.new())
+    words = (
+        "found only libLLVM.so.21.1, which cannot be loaded (libc++.so.1: cannot open shared object file); libLLVM-14"
+    )
+    assert_one_sentence(outcome.code, outcome.err, words)
