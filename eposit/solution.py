@@ -16,14 +16,21 @@ from eposit.pose import Pose
 class Status(StrEnum):
     """Outcome of one problem. Every value but OK comes with a NaN pose."""
 
-    OK = "ok"
+    # From eposit's solvers.
+    OK = "ok"  # a pose was found
     NON_FINITE = "non_finite"  # an image point is NaN or infinite
     OUTSIDE_LENS = "outside_lens"  # an image point that no ray of this lens reaches
     BEYOND_90_DEGREES = "beyond_90_degrees"  # a point at or beyond 90 degrees, where POSIT and EPOSIT have no equations
     COPLANAR = "coplanar"  # the points lie in one plane and the method cannot take that
     NOT_CONVERGED = "not_converged"  # the iteration stopped before its step fell below the tolerance
-    NO_SOLUTION = "no_solution"  # no real solution of the equations has all points in front of the camera
+    NO_SOLUTION = "no_solution"  # the solver found no pose, or none with all points in front of the camera
     INCONSISTENT = "inconsistent"  # converged, but to a pose that does not reproduce the image points
+    # From adapters of other solvers and from the stages of a pipeline.
+    TOO_FEW_POINTS = "too_few_points"  # the solver needs more points than it was given
+    UNSUPPORTED_LENS = "unsupported_lens"  # the solver has no equations for this lens
+    SOLVER_ERROR = "solver_error"  # a user's function raised an exception or returned an invalid pose
+    POINTS_MISSING = "points_missing"  # detection left fewer than four of the points asked for
+    MISSING = "missing"  # a file of poses has no row for this frame
 
 
 STATUS_TYPE = np.dtype(f"<U{max(len(status) for status in Status)}")

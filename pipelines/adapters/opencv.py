@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eposit import Camera, Solution
+from eposit import Camera, Solution, Status
 from eposit.arrays import Array
-from pipelines.adapters.results import Failure, PoseResult, pose_result, rectified, solve_each
+from pipelines.adapters.results import PoseResult, pose_result, rectified, solve_each
 
 DIRECT_LINEAR_POINTS = 6  # what ITERATIVE needs to begin with, unless the points lie in one plane
 FISHEYE_LENSES = ("equidistance", "kannala_brandt")
@@ -56,7 +56,7 @@ def fisheye(
 
     def solve_one(obj: Array, image: Array) -> PoseResult:
         if camera.lens not in FISHEYE_LENSES:
-            return PoseResult(Failure.UNSUPPORTED_LENS)
+            return PoseResult(Status.UNSUPPORTED_LENS)
         try:
             done, rotation, t = cv2.fisheye.solvePnP(obj, image[:, None], matrix, coefficients)
         except cv2.error:
@@ -85,8 +85,8 @@ def _solve_pnp(points_in_obj: ArrayLike, points_px: ArrayLike, camera: Camera, f
 
 
 def _refused(obj: Array) -> PoseResult:
-    return PoseResult(Failure.TOO_FEW_POINTS if len(obj) < DIRECT_LINEAR_POINTS else Failure.NO_SOLUTION)
+    return PoseResult(Status.TOO_FEW_POINTS if len(obj) < DIRECT_LINEAR_POINTS else Status.NO_SOLUTION)
 
 
 def _answer(done: bool, rotation: ArrayLike, t: ArrayLike) -> PoseResult:
-    return pose_result(cv2.Rodrigues(np.asarray(rotation))[0], t) if done else PoseResult(Failure.NO_SOLUTION)
+    return pose_result(cv2.Rodrigues(np.asarray(rotation))[0], t) if done else PoseResult(Status.NO_SOLUTION)

@@ -6,9 +6,9 @@ import numpy as np
 import poselib
 from numpy.typing import ArrayLike
 
-from eposit import Camera, Solution
+from eposit import Camera, Solution, Status
 from eposit.arrays import Array
-from pipelines.adapters.results import Failure, PoseResult, pose_result, rays, solve_each
+from pipelines.adapters.results import PoseResult, pose_result, rays, solve_each
 
 
 def p3p(
@@ -17,7 +17,7 @@ def p3p(
     """`poselib.p3p` on the first three rays, of any lens; the fourth point decides. Shapes as `eposit.solve`."""
 
     def solve_one(obj: Array, bearings: Array) -> PoseResult:
-        best, least = PoseResult(Failure.NO_SOLUTION), np.inf
+        best, least = PoseResult(Status.NO_SOLUTION), np.inf
         for pose in poselib.p3p(bearings[:3], obj[:3]):
             last = pose.R @ obj[3] + pose.t
             miss = float(np.linalg.norm(last / np.linalg.norm(last) - bearings[3]))
@@ -45,7 +45,7 @@ def p4pf(
         moved = obj - obj[0]
         size = np.abs(moved).max()
         plane, small = plane / np.abs(plane).max(), moved / size
-        best, least = PoseResult(Failure.NO_SOLUTION), np.inf
+        best, least = PoseResult(Status.NO_SOLUTION), np.inf
         for pose, focal in zip(*poselib.p4pf(plane, small, False), strict=True):
             in_cam = small @ pose.R.T + pose.t
             if not (focal > 0.0 and np.all(in_cam[:, 2] > 0.0)):

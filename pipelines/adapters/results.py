@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from enum import StrEnum
 from typing import Protocol
 
 import numpy as np
@@ -12,16 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from eposit import Camera, Pose, Solution, Status
 from eposit.arrays import Array
-
-
-class Failure(StrEnum):
-    """Why there is no pose, beside the reasons of `eposit.Status`."""
-
-    NO_SOLUTION = "no_solution"  # the solver found none
-    TOO_FEW_POINTS = "too_few_points"  # the solver takes more points than there are
-    UNSUPPORTED_LENS = "unsupported_lens"  # the solver has no equations for this lens
-    SOLVER_ERROR = "solver_error"  # a user's function raised an exception or gave what is no pose
-    MISSING = "missing"  # a file of poses has none for this frame
+from eposit.solution import STATUS_TYPE
 
 
 class Solver(Protocol):
@@ -42,7 +32,7 @@ def _nan(*shape: int) -> Callable[[], Array]:
 class PoseResult:
     """The outcome of one image; every status but ok comes with NaN."""
 
-    status: str
+    status: str  # a `Status`, or the reason that a user's function or file gives
     R: Array = field(default_factory=_nan(3, 3))  # (3, 3)
     t: Array = field(default_factory=_nan(3))  # (3,), the unit of points_in_obj
     iterations: int = 0
@@ -53,7 +43,7 @@ def pose_result(R: ArrayLike, t: ArrayLike) -> PoseResult:
     """A pose as an answer; one that is not finite is none. t: (3,) or (3, 1)."""
     rotation, position = np.asarray(R, dtype=np.float64), np.asarray(t, dtype=np.float64).reshape(3)
     if not (np.all(np.isfinite(rotation)) and np.all(np.isfinite(position))):
-        return PoseResult(Failure.NO_SOLUTION)
+        return PoseResult(Status.NO_SOLUTION)
     return PoseResult(Status.OK, rotation, position)
 
 
@@ -75,7 +65,7 @@ def rays(points_px: Array, camera: Camera) -> tuple[Array, NDArray[np.str_]]:
     """(b, n, 2) px to (b, n, 3) unit bearings and (b,) statuses: ok, non_finite or outside_lens."""
     finite = np.all(np.isfinite(points_px), axis=(1, 2))
     bearings = camera.bearing(np.where(finite[:, None, None], points_px, 0.0))
-    status = np.full(len(points_px), Status.OK, dtype="<U32")
+    status = np.full(len(points_px), Status.OK, dtype=STATUS_TYPE)
     status[np.any(np.isnan(bearings), axis=(1, 2))] = Status.OUTSIDE_LENS
     status[~finite] = Status.NON_FINITE
     return bearings, status

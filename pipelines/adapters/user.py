@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from datasets.errors import UserError
 from eposit import Camera, Solution, Status
 from eposit.arrays import Array
-from pipelines.adapters.results import Failure, PoseResult, Solver, checked, gather, pose_result
+from pipelines.adapters.results import PoseResult, Solver, checked, gather, pose_result
 
 NAME = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*(\.[^\W\d]\w*)*")
 ROTATION_TOLERANCE = 1e-5  # of R^T R - 1; what was computed in single precision is off by some 1e-7
@@ -116,19 +116,19 @@ def attempt(call: Callable[[], Any], what: str, tell: Callable[[str], None]) -> 
         result = call()
     except (Exception, SystemExit) as error:
         tell(_line(error))
-        return PoseResult(Failure.SOLVER_ERROR)
+        return PoseResult(Status.SOLVER_ERROR)
     answer = _read(result, what)
     fault = _fault(answer) if answer.status == Status.OK else None
     if fault:
         tell(fault)
-        return PoseResult(Failure.SOLVER_ERROR)
+        return PoseResult(Status.SOLVER_ERROR)
     return answer
 
 
 def _read(result: Any, what: str) -> PoseResult:
     """None, (R, t), (R, t, status), or an object with `status` and `cam_from_obj` or `R` and `t`."""
     if result is None:
-        return PoseResult(Failure.NO_SOLUTION)
+        return PoseResult(Status.NO_SOLUTION)
     if isinstance(result, tuple | list):
         if len(result) not in (2, 3):
             raise UserError(f"{what} gave {len(result)} values; it must give R and t, or R, t and a status")
@@ -154,7 +154,7 @@ def _answer(R: Any, t: Any, status: Any, what: str) -> PoseResult:
     if status != Status.OK:
         return PoseResult(str(status))
     if R is None or t is None:
-        return PoseResult(Failure.NO_SOLUTION)
+        return PoseResult(Status.NO_SOLUTION)
     position = np.asarray(t) if isinstance(t, np.ndarray) and t.shape in ((3, 1), (1, 3)) else t
     position = np.ravel(position) if isinstance(position, np.ndarray) else position
     rotation = _numbers(R, (3, 3), f"{what} gave R")

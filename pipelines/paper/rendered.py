@@ -13,6 +13,7 @@ from datasets.recipe.model import load_recipe
 from datasets.store.claim import claim
 from datasets.store.dataset import Dataset
 from datasets.store.lock import hold
+from eposit import Status
 from eposit.arrays import Array
 from pipelines.paper.beyond.field_images import field_of_images
 from pipelines.paper.claims import Section, Table
@@ -95,7 +96,7 @@ def _table(scores: pa.Table, cameras: pa.Table, title: str, cell: Callable[[Arra
             for s, c, u in zip(*(scores[k].to_pylist() for k in ("solver", "assumed_camera", "point_set")), strict=True)
         ]
     )
-    failed = np.array([status != "ok" for status in scores["status"].to_pylist()])
+    failed = np.array([status != Status.OK for status in scores["status"].to_pylist()])
     values = np.stack([scores[column].to_numpy() for column in COLUMNS], axis=1)
     rows: list[tuple[str, ...]] = []
     for lens in LENSES:

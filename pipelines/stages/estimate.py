@@ -14,7 +14,7 @@ from datasets.plan import Stream, rng_for, shard_count
 from datasets.rows import camera_of, covariances_by_frame, estimate_rows, points_by_frame
 from datasets.schema import FRAMES
 from datasets.store.dataset import Dataset
-from eposit import Solution
+from eposit import Solution, Status
 from eposit.arrays import Array
 from pipelines.adapters.registry import find_solver, takes_theta_centre
 from pipelines.adapters.results import PoseResult, Solver, gather
@@ -76,7 +76,7 @@ def _estimate(
     if setting.use == "all":  # a point that was not found takes no part; of four, none may be missing
         chosen, batch = chosen[found], batch[:, found]
     if np.sum(found) < 4:
-        answers = [PoseResult("points_missing")] * len(batch)
+        answers = [PoseResult(Status.POINTS_MISSING)] * len(batch)
         solution = gather(target.points[chosen], batch, camera_of(frame), answers, single=False)
     else:
         known = setting.noise_px if noisy else None if sigma is None else sigma[chosen]

@@ -18,7 +18,7 @@ from datasets.store.digest import table_digest
 from eposit import Pose, Status
 from eposit.arrays import Array
 from pipelines.adapters.registry import solver_names
-from pipelines.adapters.results import Failure, PoseResult, pose_result
+from pipelines.adapters.results import PoseResult, pose_result
 from pipelines.stages import score
 from pipelines.stages.estimate import path_of_shard
 from pipelines.stages.estimate_images import system_rows
@@ -55,7 +55,7 @@ def import_poses(dataset: Dataset, path: Path, system: System) -> int:
     count = shard_count(dataset.recipe)
     for index in range(count):
         ids = dataset.read_shard(dataset.shard_path("frames", index, count), [FRAME])[FRAME].to_pylist()
-        rows = system_rows(ids, system, [answers.get(frame, PoseResult(Failure.MISSING)) for frame in ids])
+        rows = system_rows(ids, system, [answers.get(frame, PoseResult(Status.MISSING)) for frame in ids])
         shard = path_of_shard(dataset, index, system.shard_name)
         if not (dataset.is_done(shard) and table_digest(dataset.read_shard(shard)) == table_digest(rows)):
             score.forget(dataset, shard)
@@ -169,7 +169,7 @@ def _frames(path: Path, numbers: Array) -> list[int]:
 def _pose(path: Path, frame: int, rotation: Array, t: Array) -> PoseResult:
     """One row's pose. rotation: (4,) quaternion or (9,) matrix row by row."""
     if np.all(np.isnan(rotation)) and np.all(np.isnan(t)):
-        return PoseResult(Failure.NO_SOLUTION)
+        return PoseResult(Status.NO_SOLUTION)
     where = f"{path}, frame_id {frame}"
     if not (np.all(np.isfinite(rotation)) and np.all(np.isfinite(t))):
         raise UserError(f"{where}: the pose has values that are not finite; a failure leaves all of them empty")

@@ -14,8 +14,8 @@ from rich.text import Text
 
 from datasets.plan import frame_count, shard_count
 from datasets.store.dataset import Dataset
+from eposit import Status
 from pipelines.adapters.registry import find_solver
-from pipelines.adapters.results import Failure
 from pipelines.detection import Detector
 from pipelines.engines.local import check_workers, map_shards, runs_here
 from pipelines.stages import detect, estimate, generate, score
@@ -117,7 +117,7 @@ def _run_answers(
         f"estimate {name}", dataset, indices, is_done, run_shard, workers, console, by_frame=by_frame, hint=hint
     )
     status = [text for path in paths for text in dataset.read_shard(path, ["status"])["status"].to_pylist()]
-    failed = status.count(Failure.SOLVER_ERROR)
+    failed = status.count(Status.SOLVER_ERROR)
     if failed:
         first = f"; {notes[0]}" if notes else ""
         print(f"estimate {name}: {failed} of {len(status)} rows have the status solver_error{first}", file=sys.stderr)

@@ -10,6 +10,7 @@ import pyarrow as pa
 from datasets.rows import poses, table
 from datasets.schema import COMPONENTS, SCORES
 from datasets.store.dataset import Dataset
+from eposit import Status
 from eposit.arrays import Array
 from eposit.pose import euler_error_rad, rotation_error_rad, rotation_error_vector
 
@@ -46,7 +47,7 @@ def run_shard(dataset: Dataset, estimates: Path) -> None:
     found = poses(rows)
     t_error = found.t - true.t
     euler = np.degrees(euler_error_rad(found.R, true.R))
-    failed = rows["status"].to_numpy(zero_copy_only=False) != "ok"
+    failed = rows["status"].to_numpy(zero_copy_only=False) != Status.OK
     length = np.linalg.norm(found.t, axis=1)
     with np.errstate(invalid="ignore"):
         gross = failed | (length >= GROSS_FAILURE_FACTOR * np.linalg.norm(true.t, axis=1))

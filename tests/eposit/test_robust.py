@@ -6,7 +6,9 @@ import pytest
 import eposit
 from eposit import Pose
 from eposit.pose import rotation_error_vector, rotation_from_vector
+from eposit.refine.weights import whitening
 from eposit.robust import TRIANGLES
+from eposit.robust.ray_residuals import distances, fit, ray_observations
 from eposit.robust.triangle_design import spread_triangles
 from tests.cameras import paper_camera
 
@@ -125,6 +127,20 @@ def test_sigma_of_each_point_goes_with_its_point():
     alone = eposit.solve(EIGHT[1:], pixels[:, 1:], camera, sigma_px=sigma[1:])
     assert not solution.inliers[:, 0].any()
     np.testing.assert_allclose(solution.cam_from_obj.t[0], alone.cam_from_obj.t[0], rtol=1e-12)
+
+
+def test_distances_from_a_pose_are_those_of_points_that_took_no_part():
+    """For each point, in the fit or not, the distance has the mean of two squared normal values: 2.
+
+    Six points give the pose, so half of their residuals' variance went into it, and the other two miss by that much
+    more: a residual alone would have a mean of 1 for those in the fit, and more than 2 for those outside.
+    """
+    camera, pose, pixels = images(EIGHT, "equisolid", 2000, 10)
+    view = ray_observations(EIGHT, pixels, camera, whitening(np.asarray(SIGMA), 8), True)
+    chosen = np.broadcast_to(np.arange(8) < 6, (2000, 8))
+    mean = np.mean(distances(view, chosen, *fit(view, chosen, (pose.R, pose.t))), axis=0)
+    # The mean of 2000 such values is good to 2 / sqrt(2000) = 0.045; 0.2 is four of those and the noise's second order.
+    np.testing.assert_allclose(mean, 2.0, atol=0.2)
 
 
 def test_fewer_than_eight_points_is_a_sentence():

@@ -13,7 +13,7 @@ from datasets.plan import plan
 from datasets.recipe.model import load_recipe
 from datasets.store.claim import claim
 from datasets.store.dataset import Dataset
-from eposit import Pose
+from eposit import Pose, Status
 from eposit.arrays import Array
 from pipelines.detection import Detector
 from pipelines.paper.claims import Drawing, Section, Table
@@ -123,7 +123,7 @@ def _per_picture(found: Found, detector: str) -> Table:
         hard = HARD.get(i + 1, "")
         row = [f"{i + 1} {hard}".rstrip(), status, _number(found.calibration.used_px[i])]
         for way in (found.eposit, found.eposit_all):
-            if way.status[i] != "ok":
+            if way.status[i] != Status.OK:
                 row += [way.status[i], "", ""]
                 continue
             row += [
@@ -149,7 +149,7 @@ def _summary(found: Found, detector: str) -> Table:
     rows: list[tuple[str, ...]] = []
     for way in found.ways:
         turn, shift = way.turn_rad(pictures.cam_from_obj), way.shift_mm(pictures.cam_from_obj)
-        there = np.array([status == "ok" for status in way.status])
+        there = np.array([status == Status.OK for status in way.status])
         hard = [_pose_error(way, pictures.cam_from_obj, number - 1) for number in HARD]
         rows.append(
             (
@@ -185,7 +185,7 @@ def _times(cost: Cost) -> Table:
 
 
 def _pose_error(way: MethodResult, truth: Pose, i: int) -> str:
-    if way.status[i] != "ok":
+    if way.status[i] != Status.OK:
         return way.status[i]
     return f"{way.turn_rad(truth)[i]:.2g}; {np.linalg.norm(way.shift_mm(truth)[i]):.2g}"
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from datasets.rows import decode_image
 from datasets.store.dataset import Dataset
+from eposit import Status
 from eposit.arrays import Array, Mask
 from pipelines.detection import detect_points
 from pipelines.paper.claims import Claim, Verdict
@@ -131,7 +132,7 @@ def _ordinary(found: Found, values: Array | Mask) -> Array:
 
 def _share(found: Found, way: MethodResult, within: Callable[[MethodResult], Mask]) -> str:
     inside = _ordinary(found, within(way))
-    answers = sum(way.status[i] == "ok" for i in np.flatnonzero(found.pictures.ordinary))
+    answers = sum(way.status[i] == Status.OK for i in np.flatnonzero(found.pictures.ordinary))
     share = bootstrap(100.0 * inside, mean).text(3, "%")
     return f"{int(inside.sum())} of {len(inside)} pictures, {share}; {answers} have an answer"
 
@@ -162,8 +163,8 @@ def _who_is_wrong(found: Found) -> Claim:
     for number, kind in HARD.items():
         i = number - 1
         calibrated, ours = (way.turn_rad(truth)[i] for way in (found.calibration, found.eposit))
-        wrong += bool(not calibrated <= ours) and found.eposit.status[i] == "ok"
-        eposit = f"{ours:.2g} rad" if found.eposit.status[i] == "ok" else found.eposit.status[i]
+        wrong += bool(not calibrated <= ours) and found.eposit.status[i] == Status.OK
+        eposit = f"{ours:.2g} rad" if found.eposit.status[i] == Status.OK else found.eposit.status[i]
         told.append(
             f"picture {number} ({kind}): calibration {calibrated:.2g} rad at "
             f"{found.calibration.used_px[i] / usual:.2g} times its usual reprojection error, EPOSIT {eposit}"
@@ -213,7 +214,7 @@ def _more_points(found: Found) -> Claim:
         errors = (bootstrap(_ordinary(found, way.turn_rad(truth)), median).text(2, "rad") for way in (four, every))
         return "{}: {} with four, {} with all".format(four.name.partition(",")[0], *errors)
 
-    answers = found.eposit_all.status.count("ok")
+    answers = found.eposit_all.status.count(Status.OK)
     better = np.nanmedian(_ordinary(found, found.best.turn_rad(found.pictures.cam_from_obj))) < np.nanmedian(
         _ordinary(found, found.best_four.turn_rad(found.pictures.cam_from_obj))
     )

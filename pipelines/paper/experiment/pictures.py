@@ -97,7 +97,7 @@ def calibrated(pictures: Pictures, name: str, calls: tuple[int, ...] = STAGED) -
     corners = slice(0, pictures.target.circle_index)
     size = (pictures.true.width, pictures.true.height)
     found = calibrate(pictures.target.corners, pictures.points_px[:, corners], size, pictures.nominal.fx, calls)
-    status = ["ok" if np.isfinite(rmse) else "points_missing" for rmse in found.rmse_px]
+    status: list[str] = [Status.OK if np.isfinite(rmse) else Status.POINTS_MISSING for rmse in found.rmse_px]
     board = [_rmse(_calibrated_px(found, pictures, i), pictures.points_px[i]) for i in range(len(status))]
     return found, MethodResult(name, status, found.cam_from_obj, found.rmse_px, np.array(board))
 
@@ -140,7 +140,7 @@ def estimated(
         there = np.all(np.isfinite(pixels), axis=1)
         rows = np.flatnonzero(there) if use is None else np.array(use)
         if len(rows) < LEAST_POINTS or not np.all(there[rows]):
-            status.append("points_missing")
+            status.append(Status.POINTS_MISSING)
             continue
         found = solve(pictures.target.points[rows], pixels[rows], camera, sigma[rows])
         status.append(str(found.status))

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 import eposit
-from eposit import Camera, Pose, Solution, gpnpf, opnp, pnpfr, released
+from eposit import Camera, Pose, Solution, Status, gpnpf, opnp, pnpfr, released
 from eposit.arrays import Array, Mask
 from eposit.pose import euler_error_rad
 from pipelines.adapters.registry import find_solver
@@ -73,7 +73,7 @@ def draws(lens: str, seeds: int, sigma_px: float = SIGMA_PX, path: Pose | None =
 def outcome(problem: Draws, estimate: Estimate) -> Outcome:
     """What a solver makes of the draws."""
     solution = estimate(problem)
-    failed = np.asarray(solution.status) != "ok"
+    failed = np.asarray(solution.status) != Status.OK
     angles = np.degrees(euler_error_rad(solution.cam_from_obj.R, problem.pose.R))
     shift = solution.cam_from_obj.t - problem.pose.t
     length = np.linalg.norm(solution.cam_from_obj.t, axis=1)
@@ -143,7 +143,11 @@ def with_pnpfr_root(problem: Draws, which: str) -> Solution:
     )
     nothing: Any = np.full(len(b), np.nan)
     return Solution(
-        np.where(ok, "ok", "no_solution"), pose, np.zeros(len(b), int), nothing, np.full((len(b), 6, 6), np.nan)
+        np.where(ok, Status.OK, Status.NO_SOLUTION),
+        pose,
+        np.zeros(len(b), int),
+        nothing,
+        np.full((len(b), 6, 6), np.nan),
     )
 
 

@@ -16,6 +16,7 @@ from datasets.store.dataset import Dataset
 from pipelines.stages.estimate import _noise, solve_with
 from pipelines.stages.settings import Setting
 from tests.cameras import PAPER_OBJECT, helix_pose, paper_camera
+from tests.own import own_module
 
 
 def frame_row(lens="orthogonal", pose_id=0):
@@ -92,6 +93,12 @@ def test_methods_are_the_documented_ones():
     assert eposit.METHODS == ("best", "centred", "eposit", "posit")
 
 
+OPNP = """
+    from eposit import opnp
+
+    def solve(points_in_obj, points_px, camera, *, sigma_px=None):
+        return opnp.solve(points_in_obj, points_px, camera, sigma_px=sigma_px)
+"""
 COMPONENTS = [f"{name}_normalised" for name in ("wx", "wy", "wz", "tx", "ty", "tz")]
 
 
@@ -131,6 +138,21 @@ def test_detected_points_give_a_covariance_and_true_ones_none(tiny):
     assert np.isfinite(detected).all()
     # Twelve numbers: a wrong unit, degrees for rad or px for mm, would show as 50.
     assert np.abs(detected).max() < 5.0
+
+
+def test_only_solvers_that_weigh_their_points_store_a_covariance(tiny, tmp_path, monkeypatch, cli):
+    """OPnP states the covariance of weighted points, but its pose does not weigh them: it would be another pose's.
+
+    A user's function is taken at its word.
+    """
+    root = tmp_path / "dataset"
+    shutil.copytree(tiny[1], root)
+    name = own_module(tmp_path, monkeypatch, OPNP)
+    for solver in ("opnp", f"{name}:solve"):
+        assert cli("estimate", root, "--solver", solver, "-q").code == 0
+    assert cli("score", root, "-q").code == 0
+    assert np.isnan(normalised(root, "opnp-detected-exact-all")).all()
+    assert np.isfinite(normalised(root, f"{name}@solve-detected-exact-all")).all()
 
 
 def test_a_stored_covariance_is_that_of_six_components(tiny):
