@@ -6,10 +6,11 @@ SETUP := $(VENV)/.done
 BLENDER := .venv-blender
 BLENDER_PYTHON ?= $(PYTHON)
 
-.PHONY: help setup demo test test-full check-slow lint types layers bench bench-blender wheel lock clean
+.PHONY: help setup demo test test-full check-slow test-oldest test-newest lint types layers layers-picture docs bench \
+	bench-blender wheel lock clean
 
 help:  ## this list
-	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 14
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 16
 
 setup: $(SETUP)  ## the lab's environment in .venv
 
@@ -23,7 +24,7 @@ $(SETUP): requirements.txt pyproject.toml
 demo: $(SETUP)  ## 40 rendered frames, poses and out/demo/report.html
 	$(BIN)/python -m pipelines demo --out out/demo
 
-test: $(SETUP)  ## the tests that need pip only, under 10 minutes on 2 cores
+test: $(SETUP)  ## the tests that need pip only, under 6 minutes on 2 cores
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not full and not slow"
 
 test-full: $(SETUP)  ## adds other environments: the built wheel alone
@@ -31,6 +32,19 @@ test-full: $(SETUP)  ## adds other environments: the built wheel alone
 
 check-slow: $(SETUP)  ## thirty kills at random moments
 	$(BIN)/python -m pytest -m slow
+
+test-oldest:  ## the library alone, with the oldest NumPy and SciPy that it allows
+	$(call library_tests,numpy==1.26.* scipy==1.11.*)
+
+test-newest:  ## the library alone, with the newest NumPy and SciPy
+	$(call library_tests,numpy scipy)
+
+# OpenCV is what some of the tests compare with.
+define library_tests
+$(PYTHON) -m venv --clear build/$@
+build/$@/bin/python -m pip install --quiet --disable-pip-version-check opencv-python-headless hypothesis pytest $(1)
+build/$@/bin/python -m pytest tests/eposit --confcutdir=tests/eposit
+endef
 
 lint: $(SETUP)  ## ruff
 	$(BIN)/ruff check .
@@ -41,6 +55,13 @@ types: $(SETUP)  ## pyright, strict on eposit
 
 layers: $(SETUP)  ## the layer contract
 	PYTHONPATH=. $(BIN)/lint-imports
+
+layers-picture: $(SETUP)  ## the layers as the imports are, into build/layers.svg
+	$(BIN)/python tools/layers.py build/layers.svg
+
+docs: $(SETUP)  ## the pages into build/docs, with strict links
+	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going -E -d build/doctrees docs build/docs
+	@echo build/docs/index.html
 
 bench: $(SETUP)  ## speed, as ratios measured side by side in one run
 	$(BIN)/python -m pipelines bench
@@ -60,7 +81,7 @@ wheel: $(SETUP)  ## the library `eposit` as a wheel in dist/
 lock: $(SETUP)  ## pin every dependency again
 	$(BIN)/python -m pip install --quiet uv
 	$(BIN)/uv pip compile --generate-hashes --no-emit-index-url --no-annotate --no-header --universal --python-version 3.11 \
-		--extra lab --extra dev --quiet -o requirements.txt pyproject.toml requirements-build.in
+		--extra lab --extra dev --extra docs --quiet -o requirements.txt pyproject.toml requirements-build.in
 
 clean:  ## everything that was made
 	rm -rf $(VENV) $(BLENDER) out build dist *.egg-info

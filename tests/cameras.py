@@ -48,7 +48,7 @@ def random_pose(rng: np.random.Generator, points: np.ndarray, limit_deg: float, 
     while True:
         theta, phi = np.deg2rad(rng.uniform(0.0, limit_deg)), rng.uniform(0.0, 2.0 * np.pi)
         direction = np.array([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
-        pose = Pose(Rotation.random(rng=rng).as_matrix(), distance * direction)
+        pose = Pose(Rotation.random(None, rng).as_matrix(), distance * direction)
         x, y, z = pose.apply(points).T
         if np.degrees(np.arctan2(np.hypot(x, y), z)).max() <= limit_deg:
             return pose

@@ -190,8 +190,8 @@ def _quick(forms: Array) -> tuple[Array, Array]:
     system = np.zeros((len(forms), 165, 165))
     system[:, np.arange(RANK)[:, None], fixed.rows[fixed.chosen]] = forms[:, fixed.minor[fixed.chosen]]
     system[:, RANK:] = fixed.mix @ fixed.by_second
-    right = np.zeros((165, PAIRS))
-    right[RANK:] = np.eye(PAIRS)
+    right = np.zeros((1, 165, PAIRS))  # a stack of one: NumPy 1 takes two axes beside a stack for a stack of vectors
+    right[:, RANK:] = np.eye(PAIRS)
     dual = solve_or_nan(system, right)
     return dual, (fixed.mix @ fixed.by_first) @ dual
 

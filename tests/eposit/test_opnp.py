@@ -131,7 +131,7 @@ def sqpnp(points, image):
 def test_forty_pairs_in_closed_form(signs):
     """The sum of (z_i^2 - a_i)^2 has the critical points z_i = 0 or +-sqrt(a_i): 81, the zero among them."""
     a = np.array(signs) * [0.7, 1.3, 0.4, 2.0]
-    turn = Rotation.random(rng=np.random.default_rng(2)).as_matrix()
+    turn = Rotation.random(None, np.random.default_rng(2)).as_matrix()
     turn = np.block([[turn, np.zeros((3, 1))], [np.zeros((1, 3)), 1.0]]) @ np.linalg.qr(np.vander([1, 2, 3, 5.0]))[0]
     squares = turn[:, FIRST] * turn[:, SECOND] * np.where(FIRST == SECOND, 1.0, 2.0)  # z = turn @ y
     y, pairs = critical_points(squares[None], -a[None])

@@ -54,8 +54,8 @@ def test_error_vector_is_applied_on_the_left():
 
 def test_pose_algebra_and_quaternion():
     rng = np.random.default_rng(3)
-    a = Pose(Rotation.random(5, rng=rng).as_matrix(), rng.normal(size=(5, 3)))
-    b = Pose(Rotation.random(5, rng=rng).as_matrix(), rng.normal(size=(5, 3)))
+    a = Pose(Rotation.random(5, rng).as_matrix(), rng.normal(size=(5, 3)))
+    b = Pose(Rotation.random(5, rng).as_matrix(), rng.normal(size=(5, 3)))
     points = rng.normal(size=(5, 7, 3))
     np.testing.assert_allclose((a @ b).apply(points), a.apply(b.apply(points)), atol=1e-14)
     np.testing.assert_allclose(a.inverse().apply(a.apply(points)), points, atol=1e-14)

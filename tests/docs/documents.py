@@ -1,0 +1,36 @@
+"""The documents, and the commands and Python programs in them."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCUMENTS = sorted(
+    [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")] + list((ROOT / "docs").rglob("*.md"))
+)
+EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+RUN = "python -m pipelines "
+PLACEHOLDER = "COMMAND"  # stands for any command
+
+
+def name(path):
+    """A document's path inside the checkout."""
+    return str(path.relative_to(ROOT))
+
+
+def commands():
+    """(document, line) of every `python -m pipelines` line and every such command between back quotes."""
+    for path in DOCUMENTS:
+        text = path.read_text()
+        found = re.findall(rf"^{RUN}(.+)$", text, flags=re.M) + re.findall(rf"`{RUN}([^`\n]+)`", text)
+        for line in found:
+            if line != PLACEHOLDER:
+                yield name(path), line
+
+
+def programs():
+    """(document, text) of every Python program in the documents."""
+    for path in DOCUMENTS:
+        for text in re.findall(r"^```python\n(.*?)^```", path.read_text(), flags=re.S | re.M):
+            yield name(path), text
