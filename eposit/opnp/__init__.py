@@ -211,7 +211,8 @@ def _system(points_in_obj: Array, u: Array, v: Array) -> _System:
 def _real(roots: Array, system: _System) -> tuple[NDArray[np.int64], Array, NDArray[np.int64], Array]:
     """Real roots polished by Newton, ordered by problem and cost: problem (k,), y (k, 4), steps (k,) and cost (k,).
 
-    Those that do not converge are left out, and of those that converge to one point all but the first.
+    Those that do not converge are left out, and of those that converge to one point all but the first. A loop of its
+    own: the unknown is a quaternion, the Hessian exact, and saddle points are roots, too, which a descent would leave.
     """
     with np.errstate(invalid="ignore"):
         near = np.linalg.norm(roots.imag, axis=2) <= REAL * np.linalg.norm(roots.real, axis=2)
