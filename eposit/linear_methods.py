@@ -37,11 +37,11 @@ def posit_checked(shape: Shape, image: Array, tol: float, max_iterations: int) -
     squares, spread = _squares(points_in_obj, image, start.R, start.t)
     misfit = _rms(squares, points_in_obj)
     limit = CONSISTENT_MISFIT * spread
-    clear = (misfit <= DOUBTFUL_MISFIT * spread) | (system.contraction <= CONTRACTS)
-    if not np.all(clear):
+    trusted = (misfit <= DOUBTFUL_MISFIT * spread) | (system.contraction <= CONTRACTS)
+    if not np.all(trusted):
         quick = start.iterations <= QUICK  # the iteration contracts well: no second fixed point is near
-        clear |= quick & shape.sure(start.R, start.t, len(points_in_obj) * misfit**2)
-    doubtful = np.flatnonzero(~clear & np.isfinite(spread))
+        trusted |= quick & shape.sure(start.R, start.t, len(points_in_obj) * misfit**2)
+    doubtful = np.flatnonzero(~trusted & np.isfinite(spread))
     if not len(doubtful):
         return start, misfit <= limit, squares
     some = take_last(image, doubtful)

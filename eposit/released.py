@@ -5,8 +5,6 @@ Written from a description of its behaviour, to reproduce the paper's figures; f
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -14,7 +12,7 @@ from eposit.arrays import Array, Mask, cross, take_last
 from eposit.camera import Camera
 from eposit.posit.orthography import lengths, nearest_frame
 from eposit.problem import Problem, mark, validate
-from eposit.solution import OK, Solution, Status, blank, join, named
+from eposit.solution import OK, Solution, SolutionBuffer, Status, join
 
 MAX_ITERATIONS = 50_000
 CHUNK = 4096  # problems worked on at a time
@@ -78,12 +76,12 @@ def _solve(problem: Problem, theta_centre: tuple[float, float] | None, tol: floa
         R = nearest_frame(vectors, size)
         t -= np.einsum("ijb,j->ib", R, problem.points_in_obj[0])
     mark(status, ~np.all(np.isfinite(t), axis=0), Status.NOT_CONVERGED)
-    found = blank(status, False)
-    found.clear()
+    found = SolutionBuffer.of(status, False)
+    found.fill_with_nan()
     ok = np.flatnonzero(status == OK)
-    found.cam_from_obj.R[ok], found.cam_from_obj.t[ok] = R[..., ok].transpose(2, 0, 1), t[:, ok].T
+    found.R[ok], found.t[ok] = R[..., ok].transpose(2, 0, 1), t[:, ok].T
     found.iterations[:] = iterations
-    return replace(found, status=named(status))
+    return found.solution()
 
 
 def _ratio(camera: Camera, x: Array, y: Array) -> Array:

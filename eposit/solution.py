@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +33,7 @@ class Status(StrEnum):
 
 
 STATUS_TYPE = np.dtype(f"<U{max(len(status) for status in Status)}")
-OK, STATUSES = 0, np.array(list(Status), STATUS_TYPE)  # solvers count with places in this list, which are small
+OK, STATUSES = 0, np.array(list(Status), STATUS_TYPE)  # inside solvers a status is its place in this array, an int8
 
 
 def _all_points() -> Mask:
@@ -44,47 +43,72 @@ def _all_points() -> Mask:
 
 @dataclass(frozen=True, slots=True)
 class Solution:
-    """Result of `solve` for one problem, or for a batch of b problems (then every field has a leading axis b)."""
+    """Result of `solve` for one problem, or for a batch of b problems (then every field has a leading axis b).
 
-    status: Any  # a Status, or a (b,) array of their strings, which may be read-only
+    `status`, `iterations` and `reprojection_rmse_px` have both kinds as their type; np.asarray makes arrays of them.
+    """
+
+    status: str | NDArray[np.str_]  # a `Status`, or a (b,) array of their strings, which may be read-only
     cam_from_obj: Pose  # R (3, 3) and t (3,) in the unit of points_in_obj
-    iterations: Any  # of the linear start and the refinement together
-    reprojection_rmse_px: Any  # root of the mean squared distance between image points and reprojections, px
+    iterations: int | NDArray[np.int64]  # of the linear start and the refinement together
+    reprojection_rmse_px: float | Array  # root of the mean squared distance between image points and reprojections, px
     covariance: Array  # (6, 6): rotation vector on the left in the camera frame (rad), then t; NaN for linear methods
     inliers: Mask = field(default_factory=_all_points)  # (n,) points in use: all unless `robust` left some out
 
     def first(self) -> Solution:
         """The single problem of a batch of one, without its leading axis."""
         pose = Pose(self.cam_from_obj.R[0], self.cam_from_obj.t[0])
-        status, rmse = Status(str(self.status[0])), float(self.reprojection_rmse_px[0])
+        status, rmse = Status(str(np.asarray(self.status)[0])), float(np.asarray(self.reprojection_rmse_px)[0])
         inliers = self.inliers[0] if self.inliers.ndim else self.inliers
-        return Solution(status, pose, int(self.iterations[0]), rmse, self.covariance[0], inliers)
+        return Solution(status, pose, int(np.asarray(self.iterations)[0]), rmse, self.covariance[0], inliers)
 
-    def part(self, rows: slice) -> Solution:
-        """Some rows of a batch, to read and to write."""
-        pose = Pose(self.cam_from_obj.R[rows], self.cam_from_obj.t[rows])
-        return Solution(
-            self.status[rows], pose, self.iterations[rows], self.reprojection_rmse_px[rows], self.covariance[rows]
+
+@dataclass(frozen=True, slots=True)
+class SolutionBuffer:
+    """Arrays that a solver writes the results of b problems to, chunk by chunk."""
+
+    codes: NDArray[np.int8]  # (b,) statuses as places in STATUSES; shared with the problem, which marks failures there
+    R: Array  # (b, 3, 3)
+    t: Array  # (b, 3)
+    iterations: NDArray[np.int64]  # (b,)
+    rmse_px: Array  # (b,)
+    covariance: Array  # (b, 6, 6), read-only NaN where the method states none
+
+    @staticmethod
+    def of(codes: NDArray[np.int8], with_covariance: bool) -> SolutionBuffer:
+        """Uninitialised, but for the statuses and zero iterations."""
+        b = len(codes)
+        covariance = np.empty((b, 6, 6)) if with_covariance else np.broadcast_to(np.nan, (b, 6, 6))
+        return SolutionBuffer(
+            codes, np.empty((b, 3, 3)), np.empty((b, 3)), np.zeros(b, np.int64), np.empty(b), covariance
         )
 
-    def clear(self) -> None:
-        """Set a batch's numbers to NaN, its iterations to zero."""
-        for values in (self.cam_from_obj.R, self.cam_from_obj.t, self.reprojection_rmse_px, self.covariance):
+    def part(self, rows: slice) -> SolutionBuffer:
+        """Some rows; what is written there is written here."""
+        return SolutionBuffer(
+            self.codes[rows],
+            self.R[rows],
+            self.t[rows],
+            self.iterations[rows],
+            self.rmse_px[rows],
+            self.covariance[rows],
+        )
+
+    def fill_with_nan(self) -> None:
+        """Set the numbers to NaN, iterations to zero."""
+        for values in (self.R, self.t, self.rmse_px, self.covariance):
             if values.flags.writeable:
                 values[:] = np.nan
         self.iterations[:] = 0
 
+    def solution(self) -> Solution:
+        """The result as users get it."""
+        return Solution(status_names(self.codes), Pose(self.R, self.t), self.iterations, self.rmse_px, self.covariance)
 
-def named(codes: NDArray[np.int8]) -> NDArray[np.str_]:
-    """Statuses of their places in `STATUSES`; read-only where all are the same, which then takes no memory."""
+
+def status_names(codes: NDArray[np.int8]) -> NDArray[np.str_]:
+    """Statuses of their places in `STATUSES`; read-only where all are OK, which then takes no memory."""
     return STATUSES[codes] if np.any(codes) else np.broadcast_to(STATUSES[OK], codes.shape)
-
-
-def blank(codes: NDArray[np.int8], weighs: bool) -> Solution:
-    """A batch to write to, its status still in codes. weighs: whether there will be covariances; else they are NaN."""
-    b = len(codes)
-    spread = np.empty((b, 6, 6)) if weighs else np.broadcast_to(np.nan, (b, 6, 6))
-    return Solution(codes, Pose(np.empty((b, 3, 3)), np.empty((b, 3))), np.zeros(b, np.int64), np.empty(b), spread)
 
 
 def join(parts: list[Solution]) -> Solution:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,7 +19,7 @@ from eposit.refine.weights import whitening
 from eposit.robust import solve_robust
 from eposit.search import best_poses
 from eposit.shape import Shape
-from eposit.solution import OK, Solution, Status, blank, named
+from eposit.solution import OK, Solution, SolutionBuffer, Status
 from eposit.starts import turn_back
 
 METHODS = ("best", "centred", "eposit", "posit")
@@ -75,23 +74,24 @@ def solve(
 
         def solve_part(use: Mask, obj: Array, pixels: Array) -> Solution:
             sigma = sigma_px if sigma_px is None or np.ndim(sigma_px) == 0 else np.asarray(sigma_px)[use]
-            options: dict[str, Any] = {"tol": tol, "max_iterations": max_iterations, "theta_centre": theta_centre}
-            return solve(obj, pixels, camera, method, refine=refine, sigma_px=sigma, **options)
+            return solve(
+                obj, pixels, camera, method,
+                refine=refine, sigma_px=sigma, tol=tol, max_iterations=max_iterations, theta_centre=theta_centre,
+            )  # fmt: skip
 
         return solve_robust(solve_part, problem.points_in_obj, points_px, camera, problem.weights, problem.absolute)
     shape = Shape.of(problem.points_in_obj)
-    solution = blank(problem.status, method == "best")
+    out = SolutionBuffer.of(problem.status, method == "best")
     size = max(1, min(CHUNK, CHUNK_POINTS // len(problem.points_in_obj)))
     for i in range(0, len(problem.status), size):
         rows = slice(i, i + size)
-        part, piece = problem.part(rows), solution.part(rows)
+        part, part_out = problem.part(rows), out.part(rows)
         with np.errstate(all="ignore"):
             if method == "best":
-                _solve_best(part, shape, refine, piece)
+                _solve_best(part, shape, refine, part_out)
             else:
-                _solve_linear(part, shape, method, tol, max_iterations, theta_centre, piece)
-    solution = replace(solution, status=named(problem.status))
-    solution = solution.first() if single else solution
+                _solve_linear(part, shape, method, tol, max_iterations, theta_centre, part_out)
+    solution = out.solution().first() if single else out.solution()
     return replace(solution, inliers=np.ones(np.shape(points_px)[:-1], bool))
 
 
@@ -102,7 +102,7 @@ def _solve_linear(
     tol: float,
     max_iterations: int,
     theta_centre: tuple[float, float] | None,
-    out: Solution,
+    out: SolutionBuffer,
 ) -> None:
     back, n = None, len(shape.points_in_obj)
     view = Observations.of(problem.camera, problem.points_in_obj, problem.points_px, whitening(None, n))
@@ -120,7 +120,7 @@ def _solve_linear(
             image = rectify_rays(rays)
     if not shape.solid:
         mark(problem.status, np.ones(len(problem.status), bool), Status.COPLANAR)
-        out.clear()
+        out.fill_with_nan()
         return
     start, reproduces, squares = posit_checked(shape, image, tol, max_iterations)
     mark(problem.status, ~start.converged, Status.NOT_CONVERGED)
@@ -133,20 +133,20 @@ def _solve_linear(
     _write(out, problem.status, found, costs, n)
 
 
-def _solve_best(problem: Problem, shape: Shape, refined: bool, out: Solution) -> None:
+def _solve_best(problem: Problem, shape: Shape, refined: bool, out: SolutionBuffer) -> None:
     view = Observations.of(problem.camera, problem.points_in_obj, problem.points_px, problem.weights)
     rays = unit_rays(problem.camera, onto_image_circle(problem.camera, view.seen))
     _mark_rays(problem.status, rays, False)
     if not shape.usable:
         mark(problem.status, np.ones(len(problem.status), bool), Status.COPLANAR)
-        out.clear()
+        out.fill_with_nan()
         return
     found = best_poses(shape, view, rays, refined)
     mark(problem.status, ~(found.poses.converged & np.isfinite(found.cost)), Status.NOT_CONVERGED)
     finish(problem, found, out)
 
 
-def finish(problem: Problem, found: RefinedPoses, out: Solution) -> None:
+def finish(problem: Problem, found: RefinedPoses, out: SolutionBuffer) -> None:
     """Write poses, RMSE and covariance where the status is OK."""
     n, costs, spread = len(problem.points_in_obj), found.cost, found.spread
     if problem.absolute:
@@ -161,19 +161,21 @@ def finish(problem: Problem, found: RefinedPoses, out: Solution) -> None:
         out.covariance[rows] = take_last(spread, rows).transpose(2, 0, 1)
 
 
-def _write(out: Solution, status: NDArray[np.int8], found: PoseBatch, costs: Array, n: int) -> NDArray[np.int64] | None:
+def _write(
+    out: SolutionBuffer, status: NDArray[np.int8], found: PoseBatch, costs: Array, n: int
+) -> NDArray[np.int64] | None:
     """Write poses and RMSE where the status is OK; those rows, None for all."""
     ok = status == OK
     if np.all(ok):
-        out.cam_from_obj.R[:], out.cam_from_obj.t[:] = found.R.transpose(2, 0, 1), found.t.T
-        np.sqrt(costs / n, out=out.reprojection_rmse_px)
+        out.R[:], out.t[:] = found.R.transpose(2, 0, 1), found.t.T
+        np.sqrt(costs / n, out=out.rmse_px)
         out.iterations[:] = found.iterations
         return None
     rows = np.flatnonzero(ok)
-    out.clear()
-    out.cam_from_obj.R[rows] = take_last(found.R, rows).transpose(2, 0, 1)
-    out.cam_from_obj.t[rows] = take_last(found.t, rows).T
-    out.reprojection_rmse_px[rows] = np.sqrt(costs[rows] / n)
+    out.fill_with_nan()
+    out.R[rows] = take_last(found.R, rows).transpose(2, 0, 1)
+    out.t[rows] = take_last(found.t, rows).T
+    out.rmse_px[rows] = np.sqrt(costs[rows] / n)
     out.iterations[:] = found.iterations
     return rows
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,8 +30,8 @@ class Division:
         Fitzgibbon 2001, "Simultaneous linear estimation of multiple view geometry and lens distortion", equation 5.
     """
 
-    f_px: Any  # focal length along x, px; NaN where there is no estimate
-    k_per_px2: Any  # distortion, px^-2
+    f_px: float | Array  # focal length along x, px; NaN where there is no estimate
+    k_per_px2: float | Array  # distortion, px^-2
     cx: float  # principal point, px
     cy: float  # principal point, px
     aspect: float  # fy / fx
@@ -73,7 +72,7 @@ class CameraCandidates:
     cost: Array  # (..., k) sum of squared reprojection errors, px^2; NaN where a point is not in front of the camera
     f_px: Array  # (..., k) focal length along x, px
     k_per_px2: Array  # (..., k) distortion, px^-2
-    count: Any  # how many there are, () or (b,)
+    count: int | NDArray[np.int64]  # how many there are, of one problem or (b,)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,9 +86,12 @@ class Estimate(Solution):
         """The single problem of a batch of one, without its leading axis."""
         plain = Solution(self.status, self.cam_from_obj, self.iterations, self.reprojection_rmse_px, self.covariance)
         one, camera, found = Solution.first(plain), self.camera, self.candidates
-        camera = Division(float(camera.f_px[0]), float(camera.k_per_px2[0]), camera.cx, camera.cy, camera.aspect)
+        f, k = float(np.asarray(camera.f_px)[0]), float(np.asarray(camera.k_per_px2)[0])
+        camera = Division(f, k, camera.cx, camera.cy, camera.aspect)
         poses = Pose(found.poses.R[0], found.poses.t[0])
-        candidates = CameraCandidates(poses, found.cost[0], found.f_px[0], found.k_per_px2[0], int(found.count[0]))
+        candidates = CameraCandidates(
+            poses, found.cost[0], found.f_px[0], found.k_per_px2[0], int(np.asarray(found.count)[0])
+        )
         rmse, spread = one.reprojection_rmse_px, one.covariance
         return Estimate(
             one.status, one.cam_from_obj, one.iterations, rmse, spread, camera=camera, candidates=candidates

@@ -38,7 +38,7 @@ def command_line() -> typer.Typer:
     app = typer.Typer(
         name="pipelines",
         help=ABOUT,
-        epilog="PoseBatch with: python -m pipelines demo",
+        epilog="Start with: python -m pipelines demo",
         no_args_is_help=True,
         add_completion=False,
         pretty_exceptions_enable=False,

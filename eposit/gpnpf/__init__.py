@@ -99,6 +99,8 @@ def _edge_first(points_in_obj: Array) -> NDArray[np.int64]:
 def _least_squares(system: System, s: Array) -> tuple[Array, Array]:
     """Damped Gauss-Newton on the sum of squares, from s (m,): s and F. For four points it is Newton's method.
 
+    A loop of its own: two unknowns that are no pose, whose 2 x 2 systems have a closed form.
+
     The slope along s is a complex step, which for polynomials is exact.
     """
     focal2 = squared_focal(system, s)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,7 +16,7 @@ from eposit.pose import Pose
 from eposit.problem import Problem, mark, validate
 from eposit.refine.weights import Refined, covariance, normal_equations, refine_poses
 from eposit.shape import COPLANAR_CONDITION, plane_axes
-from eposit.solution import OK, Solution, Status, join, named
+from eposit.solution import OK, Solution, Status, join, status_names
 
 CHUNK = 32  # problems worked on at a time; each takes half a megabyte
 REAL = 1e-4  # relative imaginary part below which a root is tried as real; what is not does not converge
@@ -31,11 +30,11 @@ class OpnpSolution(Solution):
     """A `Solution` with all real solutions of the polynomial system."""
 
     candidates: Candidates  # points behind the camera included; cost as `solve` defines it
-    pairs: Any  # distinct complex solution pairs +-x found: 40, fewer where some coincide or form curves; int or (b,)
+    pairs: int | NDArray[np.int64]  # distinct complex solutions +-x found: 40, fewer where some coincide or form curves
 
     def first(self) -> OpnpSolution:
         """The single problem of a batch of one, without its leading axis."""
-        return _extended(Solution.first(self), self.candidates.first(), int(self.pairs[0]))
+        return _extended(Solution.first(self), self.candidates.first(), int(np.asarray(self.pairs)[0]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +95,7 @@ def solve(
     if single:
         return parts[0].first()
     candidates = join_candidates([part.candidates for part in parts])
-    return _extended(join(list(parts)), candidates, np.concatenate([part.pairs for part in parts]))
+    return _extended(join(list(parts)), candidates, np.concatenate([np.asarray(part.pairs) for part in parts]))
 
 
 def _solve(problem: Problem, refine: bool) -> OpnpSolution:
@@ -141,7 +140,7 @@ def _finished(problem: Problem, found: Refined, status: NDArray[np.int8]) -> Sol
         )
         factor = 1.0 if problem.absolute else rmse[ok, None, None] ** 2 * n / (2 * n - 6)
         spread[ok] = covariance(normal) * factor
-    return Solution(named(status), Pose(R, t), np.where(ok, found.steps, 0), rmse, spread)
+    return Solution(status_names(status), Pose(R, t), np.where(ok, found.steps, 0), rmse, spread)
 
 
 def _checked(problem: Problem) -> tuple[NDArray[np.int8], Array, Array]:
@@ -212,7 +211,8 @@ def _system(points_in_obj: Array, u: Array, v: Array) -> _System:
 def _real(roots: Array, system: _System) -> tuple[NDArray[np.int64], Array, NDArray[np.int64], Array]:
     """Real roots polished by Newton, ordered by problem and cost: problem (k,), y (k, 4), steps (k,) and cost (k,).
 
-    Those that do not converge are left out, and of those that converge to one point all but the first.
+    Those that do not converge are left out, and of those that converge to one point all but the first. A loop of its
+    own: the unknown is a quaternion, the Hessian exact, and saddle points are roots, too, which a descent would leave.
     """
     with np.errstate(invalid="ignore"):
         near = np.linalg.norm(roots.imag, axis=2) <= REAL * np.linalg.norm(roots.real, axis=2)
@@ -266,6 +266,6 @@ def _products(y: Array) -> Array:
     return y[..., FIRST] * y[..., SECOND]
 
 
-def _extended(solution: Solution, candidates: Candidates, pairs: Any) -> OpnpSolution:
+def _extended(solution: Solution, candidates: Candidates, pairs: int | NDArray[np.int64]) -> OpnpSolution:
     fields = (solution.status, solution.cam_from_obj, solution.iterations, solution.reprojection_rmse_px)
     return OpnpSolution(*fields, solution.covariance, candidates=candidates, pairs=pairs)

@@ -95,7 +95,10 @@ def _rows(dual: Array, w: Complex, depths: Array, k: Array) -> tuple[Array, Arra
 
 
 def _newton(dual: Array, w: Complex, depths: Array, k: Array) -> tuple[Array, Array]:
-    """Newton's method on |p1| = |p2|, p1 . p2 = p1 . p3 = p2 . p3 = 0 in the depths (m, 4) and k (m,)."""
+    """Newton's method on |p1| = |p2|, p1 . p2 = p1 . p3 = p2 . p3 = 0 in the depths (m, 4) and k (m,).
+
+    A loop of its own: as many equations as unknowns, so there is no cost to bring down and no damping.
+    """
     u, v, r2 = w.real, w.imag, np.abs(w) ** 2
     for _ in range(STEPS):
         p1, p2, p3 = _rows(dual, w, depths, k)

@@ -22,7 +22,7 @@ NEWTON_TOL = 1e-6  # tolerance from which Newton steps pay
 
 
 @dataclass(slots=True)
-class _Found:
+class _Results:
     """What the iteration ends in; rows that it has not reached, or that do not converge, are NaN."""
 
     axes: Array  # (2, 3, b) I and J
@@ -37,7 +37,7 @@ class _Found:
 
 
 @dataclass(slots=True)
-class _Work:
+class _ActiveProblems:
     """The problems still iterated on."""
 
     rows: NDArray[np.int64]  # (a,) their numbers
@@ -70,43 +70,47 @@ def posit(system: Orthography, tol: float, max_iterations: int, k: Array | None 
         solved = fixed_points(system if len(rows) == b else system.take(rows), tol) if len(rows) else None
         if solved is not None and len(rows) == b and np.all(solved[1]):
             return PoseBatch(*system.pose(solved[0]), solved[2], solved[1])
-        found = _Found(np.full((2, 3, b), np.nan), np.zeros(b, np.int64), np.zeros(b, bool))
+        found = _Results(np.full((2, 3, b), np.nan), np.zeros(b, np.int64), np.zeros(b, bool))
         if solved is not None:
             found.put(rows, *solved)
         _iterate(system, tol, max_iterations, k, step, found)
         return PoseBatch(*system.pose(found.axes), found.iterations, found.converged)
 
 
-def _iterate(system: Orthography, tol: float, max_iterations: int, k: Array | None, step: float, found: _Found) -> None:
+def _iterate(
+    system: Orthography, tol: float, max_iterations: int, k: Array | None, step: float, found: _Results
+) -> None:
     """The plain iteration on the rows that have not converged yet."""
     rows = np.flatnonzero(~found.converged & np.isfinite(system.contraction))
     if len(rows) < len(found.converged):
         system, k = system.take(rows), None if k is None else take_last(k, rows)
-    work = _Work(rows, system, k, np.zeros((2, 3, len(rows))), np.zeros(len(rows)))
+    problems = _ActiveProblems(rows, system, k, np.zeros((2, 3, len(rows))), np.zeros(len(rows)))
     active = np.ones(len(rows), bool)
     for count in range(1, max_iterations + 1):
         if not np.all(active) and COMPRESS * np.count_nonzero(active) <= (COMPRESS - 1) * len(active):
             kept = np.flatnonzero(active)
-            work.keep(kept)
+            problems.keep(kept)
             active = np.ones(len(kept), bool)
         if not len(active):
             break
-        scale, small = _step(work, tol, step, count)
+        scale, small = _step(problems, tol, step, count)
         gone = active & (small | ~np.isfinite(scale))
         if np.any(gone) or count == max_iterations:
             gone = active if count == max_iterations else gone
-            found.put(work.rows[gone], work.axes[..., gone], small[gone], count)
+            found.put(problems.rows[gone], problems.axes[..., gone], small[gone], count)
             active = active & ~gone
 
 
-def _step(work: _Work, tol: float, step: float, count: int) -> tuple[Array, Mask]:
+def _step(problems: _ActiveProblems, tol: float, step: float, count: int) -> tuple[Array, Mask]:
     """One step of the iteration; the scale, and where I and J have settled."""
-    axes = work.system.axes(work.k)
+    axes = problems.system.axes(problems.k)
     scale, target = third_axis(axes)
-    work.k = target if step == 1.0 else step * target + (0.0 if work.k is None else (1.0 - step) * work.k)
-    moved = axes - work.axes
+    problems.k = target if step == 1.0 else step * target + (0.0 if problems.k is None else (1.0 - step) * problems.k)
+    moved = axes - problems.axes
     change = np.einsum("aib,aib->b", moved, moved)
     limit = (tol * scale) ** 2
-    small = (change <= limit) | (change * change <= limit * work.change) if count > 1 else np.zeros(len(change), bool)
-    work.axes, work.change = axes, change if count > 1 else work.change
+    small = (
+        (change <= limit) | (change * change <= limit * problems.change) if count > 1 else np.zeros(len(change), bool)
+    )
+    problems.axes, problems.change = axes, change if count > 1 else problems.change
     return scale, small

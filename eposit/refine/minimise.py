@@ -128,6 +128,7 @@ def _with_one_matrix(
 ) -> tuple[PoseBatch, Array]:
     """At most so many steps with the given inverse matrix until they vanish, for the rows that are `alive`.
 
+    Apart from `_damped` because it forms gradients only, never the matrix, which is most of a step's work.
     Also the sizes of the first steps, (b,).
     """
     b = len(alive)

@@ -88,10 +88,10 @@ def solve_robust(
 def _in_order(solution: Solution, rows: NDArray[np.int64]) -> Solution:
     """A batch whose problem i belongs in row rows[i]."""
     order, pose = np.argsort(rows), solution.cam_from_obj
-    rmse, spread = solution.reprojection_rmse_px[order], solution.covariance[order]
-    return Solution(
-        solution.status[order], Pose(pose.R[order], pose.t[order]), solution.iterations[order], rmse, spread
+    status, iterations, rmse = (
+        np.asarray(values)[order] for values in (solution.status, solution.iterations, solution.reprojection_rmse_px)
     )
+    return Solution(status, Pose(pose.R[order], pose.t[order]), iterations, rmse, solution.covariance[order])
 
 
 def _trimmed(view: RayObservations, triangles: list[list[int]]) -> tuple[tuple[Array, Array], Mask]:

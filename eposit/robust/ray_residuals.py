@@ -83,7 +83,11 @@ def _linear(view: RayObservations, R: Array, t: Array) -> tuple[Array, Array]:
 
 
 def fit(view: RayObservations, chosen: Mask, cam_from_obj: tuple[Array, Array]) -> tuple[Array, Array]:
-    """Two Gauss-Newton steps on the chosen points, each taken where it does not raise their squares."""
+    """Two Gauss-Newton steps on the chosen points, each taken where it does not raise their squares.
+
+    A loop of its own beside `refine.minimise`: each image has its own choice of points, poses have one more axis, and
+    residuals are those of rays, which exist for points that a projection on trial would put outside the lens.
+    """
     R, t = cam_from_obj
     for _ in range(2):
         residual, slope = _linear(view, R, t)

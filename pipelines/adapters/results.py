@@ -108,15 +108,16 @@ def gather(
 ) -> Solution:
     """Answers to (b, n, 2) px as one `Solution`; for a single image without the leading axis."""
     batch = stack(answers)
-    ok, rmse, pose = batch.status == Status.OK, batch.reprojection_rmse_px, batch.cam_from_obj
+    ok, rmse = np.asarray(batch.status) == Status.OK, np.asarray(batch.reprojection_rmse_px)
+    pose = batch.cam_from_obj
     if np.any(ok):
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
             miss = camera.project(Pose(pose.R[ok], pose.t[ok]).apply(points_in_obj)) - points_px[ok]
             rmse[ok] = np.sqrt(np.mean(np.sum(miss**2, axis=-1), axis=-1))
     if not single:
         return batch
-    iterations, covariance = int(batch.iterations[0]), batch.covariance[0]
-    return Solution(str(batch.status[0]), Pose(pose.R[0], pose.t[0]), iterations, float(rmse[0]), covariance)
+    status, iterations = str(np.asarray(batch.status)[0]), int(np.asarray(batch.iterations)[0])
+    return Solution(status, Pose(pose.R[0], pose.t[0]), iterations, float(rmse[0]), batch.covariance[0])
 
 
 def stack(answers: Sequence[PoseResult]) -> Solution:

@@ -84,10 +84,10 @@ def read_poses(path: Path) -> dict[int, PoseResult]:
     frames = _frames(path, numbers[FRAME])
     R = np.stack([numbers[name] for name in rotation], axis=1)
     t = np.stack([numbers[name] for name in position], axis=1)
-    told = [str(status or "").strip() or Status.OK for status in columns.get("status", [None] * len(frames))]
+    statuses = [str(status or "").strip() or Status.OK for status in columns.get("status", [None] * len(frames))]
     return {
         frame: _pose(path, frame, R[i], t[i]) if status.lower() == Status.OK else PoseResult(status)
-        for i, (frame, status) in enumerate(zip(frames, told, strict=True))
+        for i, (frame, status) in enumerate(zip(frames, statuses, strict=True))
     }
 
 

@@ -75,7 +75,7 @@ def read_pictures(dataset: Dataset, detector: str) -> Pictures:
     points, sigmas = points_by_frame(rows, target), covariances_by_frame(rows, target)
     ids = frames["frame_id"].to_pylist()
     n, each = len(target.points), rows["status"].to_pylist()
-    status = [_told(each[i * n : (i + 1) * n]) for i in range(len(ids))]
+    status = [_detection_status(each[i * n : (i + 1) * n]) for i in range(len(ids))]
     true = camera_of(first)
     return Pictures(
         target, dataset.recipe.four_indices(), true, assumed_camera(true, first["nominal_f_px"]), poses(frames),
@@ -83,7 +83,7 @@ def read_pictures(dataset: Dataset, detector: str) -> Pictures:
     )  # fmt: skip
 
 
-def _told(statuses: list[str]) -> str:
+def _detection_status(statuses: list[str]) -> str:
     bad = [status for status in statuses if status != "ok"]
     return f"{len(statuses) - len(bad)} points, {bad[0]}" if bad else "ok"
 
