@@ -7,13 +7,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
 
 from eposit.arrays import Array, Mask
 
 RESAMPLES = 1000
 FEW = 200  # resamples where a table has many scores: an interval's ends are good to a tenth of its length
 LEVEL = 0.95
-NORMAL_97 = 1.959963984540054  # quantile of 0.975
 CHUNK_VALUES = 4_000_000  # resampled values held at once
 
 
@@ -49,14 +50,22 @@ def bootstrap(
         return Interval(np.nan, np.nan, np.nan)
     units = units.reshape(len(units), -1)
     value = float(statistic(units.reshape(1, -1))[0])
-    rng, found = np.random.default_rng(seed), list[Array]()
-    chunk = max(1, CHUNK_VALUES // units.size)
-    for begin in range(0, resamples, chunk):
-        drawn = rng.integers(len(units), size=(min(chunk, resamples - begin), len(units)))
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # a draw of failures only has no score
-            found.append(statistic(units[drawn].reshape(len(drawn), -1)))
-    low, high = np.nanquantile(np.concatenate(found), [(1.0 - LEVEL) / 2.0, (1.0 + LEVEL) / 2.0])
+    if len(units) == 1:
+        return Interval(value, value, value)
+
+    def of_units(chosen: NDArray[np.int64], axis: int) -> Array:
+        drawn = units[np.atleast_2d(chosen)]  # axis is the last, over the units
+        found = statistic(drawn.reshape(len(drawn), -1))
+        return found if chosen.ndim > 1 else found[0]
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a draw of failures only has no score
+        drawn = stats.bootstrap(
+            (np.arange(len(units)),), of_units, n_resamples=resamples, batch=max(1, CHUNK_VALUES // units.size),
+            vectorized=True, method="percentile", random_state=np.random.default_rng(seed),
+        )  # fmt: skip
+    # SciPy's own interval is NaN where one draw is.
+    low, high = np.nanquantile(drawn.bootstrap_distribution, [(1.0 - LEVEL) / 2.0, (1.0 + LEVEL) / 2.0])
     return Interval(value, float(low), float(high))
 
 
@@ -87,10 +96,9 @@ def rate(happened: Mask) -> Interval:
 
 def wilson(happened: Mask) -> Interval:
     """Share of true values that are independent of each other, with Wilson's interval (Wilson 1927)."""
-    n, p, z2 = len(happened), float(np.mean(happened)), NORMAL_97**2
-    centre = (p + z2 / (2 * n)) / (1.0 + z2 / n)
-    half = NORMAL_97 / (1.0 + z2 / n) * np.sqrt(p * (1.0 - p) / n + z2 / (4 * n * n))
-    return Interval(p, max(0.0, float(centre - half)), min(1.0, float(centre + half)))
+    n, count = len(happened), int(np.sum(happened))
+    found = stats.binomtest(count, n).proportion_ci(LEVEL, method="wilson")
+    return Interval(count / n, float(found.low), float(found.high))
 
 
 def percent(value: Interval, digits: int = 1) -> str:

@@ -58,7 +58,7 @@ def bench(
     json: o.Json = False,
 ) -> None:
     """Speed as ratios measured side by side, and memory over a long run."""
-    from datasets.store.dataset import write_text
+    from datasets.store.atomic import write_text
     from pipelines.bench.command import measured
     from pipelines.bench.table import Comparison, Figure, markdown
     from pipelines.machine import facts

@@ -1,9 +1,16 @@
-"""What every part of the reproduction hands to its page: tables, figures and claims."""
+"""The paper's claims: what it says as a table of statements, and each statement beside what we measure."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from enum import StrEnum
+from typing import Generic, TypeVar
+
+from pipelines.report.sections import Section
+
+Measured = TypeVar("Measured")
+EQUATIONS, RELEASED = "equations", "released"  # the paper's equations, and its released code's behaviour
 
 
 class Verdict(StrEnum):
@@ -12,11 +19,6 @@ class Verdict(StrEnum):
     HOLDS = "holds"
     PARTLY = "partly"
     FAILS = "does not hold"
-
-
-def held(condition: bool, otherwise: Verdict = Verdict.FAILS) -> Verdict:
-    """The verdict that a measured condition gives."""
-    return Verdict.HOLDS if condition else otherwise
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,29 +36,55 @@ class Claim:
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
-    """A table of texts."""
+class Statement(Generic[Measured]):
+    """An entry of a table of claims: fields as a `Claim`'s, each a fixed text or a function of what was measured."""
 
-    title: str
-    head: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    note: str = ""
+    section: str
+    text: str
+    paper: str
+    equations: Callable[[Measured], str] | str
+    released: Callable[[Measured], str] | str
+    verdict: Callable[[Measured], Verdict]
+    why: Callable[[Measured], str] | str
+    part: str
+
+    def judged(self, measured: Measured) -> Claim:
+        """The claim with its figures and its verdict."""
+        equations, released, why = (
+            told if isinstance(told, str) else told(measured) for told in (self.equations, self.released, self.why)
+        )
+        verdict = self.verdict(measured)
+        return Claim(self.section, self.text, self.paper, equations, released, verdict, why, self.part)
 
 
 @dataclass(frozen=True, slots=True)
-class Drawing:
-    """A figure as one SVG text."""
+class PaperSection(Section):
+    """A section with the claims that it judges."""
 
-    title: str
-    svg: str
-    note: str = ""
+    claims: tuple[Claim, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Section:
-    """What one part found."""
+def judged(statements: Iterable[Statement[Measured]], measured: Measured) -> tuple[Claim, ...]:
+    """The claims of a table."""
+    return tuple(statement.judged(measured) for statement in statements)
 
-    title: str
-    intro: str
-    items: tuple[Table | Drawing, ...]
-    claims: tuple[Claim, ...] = field(default=())
+
+def holds_if(
+    condition: Callable[[Measured], bool], otherwise: Verdict = Verdict.FAILS
+) -> Callable[[Measured], Verdict]:
+    """The rule that a claim holds where a measured condition does."""
+    return lambda measured: Verdict.HOLDS if condition(measured) else otherwise
+
+
+def always(verdict: Verdict) -> Callable[[object], Verdict]:
+    """The rule of a claim whose verdict is a matter of reading, whatever is measured."""
+    return lambda measured: verdict
+
+
+def by_both(figure: Callable[..., str], *details: object) -> tuple[Callable[..., str], Callable[..., str]]:
+    """The figures by the equations and as released, of a function of what was measured, the method and details."""
+
+    def of(method: str) -> Callable[..., str]:
+        return lambda measured: figure(measured, method, *details)
+
+    return of(EQUATIONS), of(RELEASED)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import jinja2
 from rich.console import Console
 from rich.progress import Progress
 from threadpoolctl import threadpool_limits
@@ -15,11 +14,13 @@ from datasets.store.atomic import write_text
 from datasets.store.refusals import refused
 from pipelines.engines.local import check_workers
 from pipelines.machine import versions
-from pipelines.paper.claims import Claim, Drawing, Section
+from pipelines.paper.claims import Claim, PaperSection
+from pipelines.report.template import rendered
 
 PAGE, CLAIMS = "paper.html", "claims.md"
+TEMPLATE = Path(__file__).with_name("page.html")
 IMAGE_PARTS = ("images", "wide", "experiment")
-Measure = Callable[[], Sequence[Section]]
+Measure = Callable[[], Sequence[PaperSection]]
 MAX_SEEDS = 1000
 
 
@@ -28,14 +29,18 @@ def parts(out: Path, seeds: int, workers: int, tell: Callable[[str], None]) -> d
     from pipelines.paper.beyond import beyond
     from pipelines.paper.experiment import measure as experiment
     from pipelines.paper.rendered import images, wide
-    from pipelines.paper.simulation import comparison, precision, sensitivity
+    from pipelines.paper.simulation.fisheye import fisheye
+    from pipelines.paper.simulation.pinhole import pinhole
+    from pipelines.paper.simulation.precision import precision
+    from pipelines.paper.simulation.principal_point import principal_point
+    from pipelines.paper.simulation.sensitivity import sensitivity
 
     return {
-        "precision": lambda: [precision.precision(seeds)],
-        "principal-point": lambda: [precision.principal_point(seeds)],
-        "pinhole": lambda: [comparison.pinhole(seeds)],
-        "fisheye": lambda: [comparison.fisheye(seeds)],
-        "sensitivity": lambda: [sensitivity.sensitivity(max(1, seeds // 4))],
+        "precision": lambda: [precision(seeds)],
+        "principal-point": lambda: [principal_point(seeds)],
+        "pinhole": lambda: [pinhole(seeds)],
+        "fisheye": lambda: [fisheye(seeds)],
+        "sensitivity": lambda: [sensitivity(max(1, seeds // 4))],
         "beyond": beyond,
         "images": lambda: [images(out / "images", workers, tell)],
         "wide": lambda: [wide(out / "wide", workers, tell)],
@@ -54,7 +59,7 @@ def reproduce(out: Path, only: Sequence[str], seeds: int, points_only: bool, wor
     if not 1 <= seeds <= MAX_SEEDS:
         raise UserError(f"{seeds} draws of noise are not usable; give --seeds from 1 to {MAX_SEEDS}")
     check_workers(workers)
-    console, sections, claims = Console(), list[Section](), list[Claim]()
+    console, sections, claims = Console(), list[PaperSection](), list[Claim]()
     # The batches are of small matrices, which threads only slow down.
     with Progress(console=console) as progress, threadpool_limits(1):
         known = parts(out, seeds, workers, lambda text: progress.update(bar, description=text))
@@ -78,19 +83,13 @@ def reproduce(out: Path, only: Sequence[str], seeds: int, points_only: bool, wor
     return write(out, sections, claims, seeds)
 
 
-def write(out: Path, sections: Sequence[Section], claims: Sequence[Claim], seeds: int) -> tuple[Path, Path]:
+def write(out: Path, sections: Sequence[PaperSection], claims: Sequence[Claim], seeds: int) -> tuple[Path, Path]:
     """`paper.html` and `claims.md` in a folder.
 
     Raises:
         UserError: the disk refuses.
     """
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent), autoescape=True, trim_blocks=True, lstrip_blocks=True
-    )
-    environment.tests["drawing"] = lambda item: isinstance(item, Drawing)
-    html = environment.get_template("page.html").render(
-        sections=sections, claims=claims, versions=versions(), seeds=seeds
-    )
+    html = rendered(TEMPLATE, sections=sections, claims=claims, versions=versions(), seeds=seeds)
     found = out / PAGE, out / CLAIMS
     for path, text in zip(found, (html, markdown(claims)), strict=True):
         write_text(path, text)

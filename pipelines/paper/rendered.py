@@ -16,8 +16,9 @@ from datasets.store.lock import hold
 from eposit import Status
 from eposit.arrays import Array
 from pipelines.paper.beyond.field_images import field_of_images
-from pipelines.paper.claims import Section, Table
+from pipelines.paper.claims import PaperSection
 from pipelines.paper.simulation import COMPONENTS, LENSES, UNITS
+from pipelines.report.sections import Table
 from pipelines.stages.run import run_detect, run_estimate, run_generate, run_score
 from pipelines.stages.settings import Setting
 from pipelines.statistics import bootstrap, mean, median
@@ -40,7 +41,7 @@ HEAD = (
 )
 
 
-def images(folder: Path, workers: int, tell: Callable[[str], None]) -> Section:
+def images(folder: Path, workers: int, tell: Callable[[str], None]) -> PaperSection:
     """Mean errors and medians of |error| on rendered pictures.
 
     Raises:
@@ -61,10 +62,10 @@ def images(folder: Path, workers: int, tell: Callable[[str], None]) -> Section:
         "the bias of the assumed camera. At large tilts so high a circle is seen over the edge of a square or of the "
         "board; where it is not found, four points give no pose."
     )
-    return Section("On rendered pictures", intro, tables)
+    return PaperSection("On rendered pictures", intro, tables)
 
 
-def wide(folder: Path, workers: int, tell: Callable[[str], None]) -> Section:
+def wide(folder: Path, workers: int, tell: Callable[[str], None]) -> PaperSection:
     """Success against field angle on the pictures of the recipe `wide`.
 
     Raises:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 
 from datasets.rows import decode_image, of_detector, points_by_frame
@@ -18,9 +17,10 @@ from pipelines.machine import versions
 from pipelines.report import figures
 from pipelines.report.data import ERRORS, normalised_rows, score_rows, series
 from pipelines.report.points import field_rows, point_errors, tilt_rows
-from pipelines.statistics import Interval
+from pipelines.report.template import rendered
 
 REPORT = "report.html"
+TEMPLATE = Path(__file__).with_name("page.html")
 GALLERY = 15  # pictures at most
 
 
@@ -44,12 +44,8 @@ def write_report(dataset: Dataset) -> Path:
     found = series(dataset.read("scores"))
     # Who scores a whole system of their own may have detected nothing.
     points = point_errors(dataset, frames) if dataset.shards("detections") else []
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent), autoescape=True, trim_blocks=True, lstrip_blocks=True
-    )
-    environment.filters["number"] = _number
-    environment.filters["share"] = _share
-    html = environment.get_template("page.html").render(
+    html = rendered(
+        TEMPLATE,
         recipe=dataset.recipe,
         recipe_text=(dataset.root / RECIPE_FILE).read_text(encoding="utf-8"),
         frames=frames,
@@ -93,13 +89,3 @@ def _gallery(dataset: Dataset, frames: list[dict[str, Any]]) -> list[dict[str, A
             found = int(np.isfinite(marked[:, 0]).sum())
             pictures.append({**frame, "svg": svg, "found": found, "total": len(marked)})
     return pictures
-
-
-def _number(value: float | None, digits: int = 3) -> str:
-    if value is None or not np.isfinite(value):
-        return "\N{EN DASH}"
-    return f"{value:.{digits}g}" if abs(value) >= 1e-4 or value == 0.0 else f"{value:.1e}"
-
-
-def _share(found: Interval) -> str:
-    return f"[{100.0 * found.low:.1f}, {100.0 * found.high:.1f}] %"

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from scipy.stats import binomtest
+from scipy.stats import norm
 
-from pipelines.statistics import bootstrap, mean, median, percent, percentile95, rate, wilson
+from pipelines.statistics import Interval, bootstrap, mean, median, percent, percentile95, rate, wilson
 
 
 def test_the_interval_of_a_mean_is_that_of_the_normal_distribution():
@@ -45,10 +45,22 @@ def test_the_same_data_give_the_same_interval():
 
 
 def test_rates_have_wilsons_interval():
+    z2 = norm.ppf(0.975) ** 2
     for good, n in ((0, 20), (7, 20), (20, 20), (950, 1000)):
-        found = wilson(np.arange(n) < good)
-        interval = binomtest(good, n).proportion_ci(method="wilson")
-        np.testing.assert_allclose((found.low, found.high), (interval.low, interval.high), atol=1e-12)
+        found, p = wilson(np.arange(n) < good), good / n
+        assert found.value == p
+        # Its ends are where the normal deviation of the share is 1.96 standard errors; rounding of numbers of 1.
+        for end in (found.low, found.high):
+            assert n * (end - p) ** 2 == pytest.approx(z2 * end * (1.0 - end), abs=1e-12)
+
+
+def test_one_unit_alone_has_no_scatter():
+    assert bootstrap(np.array([[3.0, 4.0]]), mean) == Interval(3.5, 3.5, 3.5)
+
+
+def test_units_without_a_value_do_not_spoil_the_interval():
+    found = bootstrap(np.array([1.0, np.nan, np.nan]), mean)  # of three draws in ten none is the first
+    assert found == Interval(1.0, 1.0, 1.0)
 
 
 def test_a_rate_is_known_even_where_nothing_happened():

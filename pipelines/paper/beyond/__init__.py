@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from pipelines.paper.beyond import assumed_lens, coverage, efficiency, field, robustness, uniqueness
-from pipelines.paper.claims import Section
+from pipelines.paper.claims import PaperSection
 
 
-def beyond() -> tuple[Section, ...]:
+def beyond() -> tuple[PaperSection, ...]:
     """All sections; that of rendered pictures takes a dataset: `field_images.field_of_images`."""
     return (
         field.field(),

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.stats import chi2
 
 import eposit
 from eposit.arrays import Array
-from pipelines.paper.claims import Section, Table
+from pipelines.paper.claims import PaperSection
 from pipelines.paper.problems import SIGMA_PX, camera_with, cloud, errors_of, helix, information, noisy
+from pipelines.report.sections import Table
 from pipelines.statistics import percent, wilson
 
-CHI_SQUARE_95 = 12.591587243743977  # 95 % quantile of chi-square with 6 degrees of freedom
+CHI_SQUARE_95 = float(chi2.ppf(0.95, 6))  # for six degrees of freedom
 CASES = (("perspective", 4), ("perspective", 20), ("orthogonal", 4), ("orthogonal", 20))
 LENS_TEXT = {"perspective": "pinhole", "orthogonal": "orthogonal fish-eye"}
 
 
-def coverage(trials: int = 20000, sigma_px: float = SIGMA_PX, seed: int = 2) -> Section:
+def coverage(trials: int = 20000, sigma_px: float = SIGMA_PX, seed: int = 2) -> PaperSection:
     """95 % regions from `solution.covariance`, and from the covariance at the truth, for four cases."""
     head = ("camera", "points", "covariance at the estimate", "covariance at the truth", "no pose")
     rows: list[tuple[str, ...]] = []
@@ -33,7 +35,7 @@ def coverage(trials: int = 20000, sigma_px: float = SIGMA_PX, seed: int = 2) -> 
         "The solver states a covariance. Where noise is small against what bends the equations, the squared error over "
         "it has a chi-square distribution with six degrees of freedom, and 95 % of the regions hold the truth."
     )
-    return Section("Stated uncertainty", intro, (Table(title, head, tuple(rows), note),))
+    return PaperSection("Stated uncertainty", intro, (Table(title, head, tuple(rows), note),))
 
 
 def squared_errors(lens: str, n: int, trials: int, sigma_px: float, seed: int) -> tuple[Array, Array]:

@@ -7,7 +7,7 @@ import numpy as np
 
 import eposit
 from eposit.arrays import Array
-from pipelines.paper.claims import Claim, Drawing, Section, Table, held
+from pipelines.paper.claims import PaperSection, Statement, holds_if
 from pipelines.paper.problems import (
     NORMAL_MEDIAN,
     OBJECT,
@@ -21,6 +21,7 @@ from pipelines.paper.problems import (
     noisy,
     repeated,
 )
+from pipelines.report.sections import Drawing, Table
 from pipelines.report.svg import STYLE, svg
 from pipelines.statistics import Interval, bootstrap, median
 
@@ -32,7 +33,7 @@ RESAMPLES = 300
 TICKS = tuple(digit * 10.0**power for power in range(-2, 3) for digit in (1, 2, 5))
 
 
-def bound(draws: int = 20, seed: int = 3) -> Section:
+def bound(draws: int = 20, seed: int = 3) -> PaperSection:
     """Median absolute error over its bound, for each component, camera and method."""
     rows: list[tuple[str, ...]] = []
     for lens, camera in CAMERAS.items():
@@ -51,10 +52,10 @@ def bound(draws: int = 20, seed: int = 3) -> Section:
         "divided by its own frame's bound times 0.6745, the median of a normal deviation. EPOSIT solves for I and J "
         "freely and drops that they are as long as each other and perpendicular; refinement keeps both."
     )
-    return Section("The bound", intro, (table,))
+    return PaperSection("The bound", intro, (table,))
 
 
-def more_points(draws: int = 4, step: float = 1.0, seed: int = 4) -> Section:
+def more_points(draws: int = 4, step: float = 1.0, seed: int = 4) -> PaperSection:
     """RMS error of EPOSIT and of the default against the number of points, beside the bound."""
     found = {lens: _rms_errors(lens, draws, step, seed) for lens in CAMERAS}
     head = ("camera", "points", *(f"{name}: {what}" for what in ("rotation, deg", "position, mm") for name in _NAMES))
@@ -69,26 +70,28 @@ def more_points(draws: int = 4, step: float = 1.0, seed: int = 4) -> Section:
     )
     table = Table("RMS error against the number of points", head, rows, "RMS of the whole rotation and position.")
     drawing = Drawing("Error against the number of points", _lines(found))
-    return Section("More points", intro, (drawing, table), (_claim(found),))
+    return PaperSection("More points", intro, (drawing, table), (STATEMENT.judged(found),))
 
 
-def _claim(found: dict[str, Array]) -> Claim:
+def _rms_text(found: dict[str, Array]) -> str:
     four, many = found["orthogonal"][0], found["orthogonal"][-1]
-    helps = bool(np.all(many[:2] < four[:2]))
     rotation, position = (
         f"EPOSIT {four[0, k]:.2g} to {many[0, k]:.2g} {unit}, default {four[1, k]:.2g} to {many[1, k]:.2g} {unit}"
         for k, unit in ((0, "deg"), (1, "mm"))
     )
-    return Claim(
-        section="V",
-        text="More than four points will make the algorithm more robust to noise",
-        paper="left to later work",
-        equations=f"RMS from {COUNTS[0]} to {COUNTS[-1]} points, orthogonal lens: {rotation}; {position}",
-        released="has four points only",
-        verdict=held(helps),
-        why="Least squares on EPOSIT's equations takes any number of points; only refinement stays at the bound.",
-        part="beyond",
-    )
+    return f"RMS from {COUNTS[0]} to {COUNTS[-1]} points, orthogonal lens: {rotation}; {position}"
+
+
+def _more_is_better(found: dict[str, Array]) -> bool:
+    four, many = found["orthogonal"][0], found["orthogonal"][-1]
+    return bool(np.all(many[:2] < four[:2]))
+
+
+STATEMENT = Statement(
+    "V", "More than four points will make the algorithm more robust to noise", "left to later work", _rms_text,
+    "has four points only", holds_if(_more_is_better),
+    "Least squares on EPOSIT's equations takes any number of points; only refinement stays at the bound.", "beyond",
+)  # fmt: skip
 
 
 _NAMES = ("EPOSIT", "default", "bound")

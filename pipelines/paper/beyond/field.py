@@ -12,8 +12,9 @@ import eposit
 from eposit import Camera, Pose, Solution
 from eposit.arrays import Array, Mask
 from pipelines.adapters.registry import find_solver
-from pipelines.paper.claims import Drawing, Section, Table
+from pipelines.paper.claims import PaperSection
 from pipelines.paper.problems import OBJECT, SIGMA_PX, at_field_angle, bounds, errors_of, information, noisy
+from pipelines.report.sections import Drawing, Table
 from pipelines.report.svg import STYLE, svg
 from pipelines.statistics import Interval, percent, wilson
 
@@ -29,7 +30,7 @@ LIMIT_DEG = float(np.rad2deg(np.arctan(np.sqrt(2.0))))
 WIDE = Camera(lens="equidistance", fx=552.0, fy=552.0, cx=1800.0, cy=1800.0, width=3601, height=3601)
 
 
-def field(trials: int = 200, angles: tuple[int, ...] = ANGLES, seed: int = 1) -> Section:
+def field(trials: int = 200, angles: tuple[int, ...] = ANGLES, seed: int = 1) -> PaperSection:
     """Success against field angle, on exact points and with noise of 0.4 px."""
     exact = _rates(trials, angles, seed, _exact_success)
     with_noise = _rates(trials, angles, seed, _noisy_success)
@@ -39,21 +40,21 @@ def field(trials: int = 200, angles: tuple[int, ...] = ANGLES, seed: int = 1) ->
         f"their iteration contracts by tan(theta) / sqrt 2 a step: the limit is {LIMIT_DEG:.1f} degrees. The centred "
         "form turns M0's ray onto the axis first. OpenCV's SQPNP is given rectified points, which end at 90 degrees."
     )
-    ways = (
+    kinds = (
         ("exact points", f"rotation within {EXACT_RAD:g} rad", exact),
         (f"noise of {SIGMA_PX:g} px", f"all six errors within {NOISY_BOUNDS:g} Cramer-Rao bounds", with_noise),
     )
     tables = tuple(
         _table(f"Success against field angle, {name}", angles, found, f"Success: {what}. 95 % intervals by Wilson.")
-        for name, what, found in ways
+        for name, what, found in kinds
     )
     drawing = Drawing(
         "Success against field angle",
-        curves(angles, {name: found for name, _, found in ways}),
+        curves(angles, {name: found for name, _, found in kinds}),
         f"The dashed line is EPOSIT's limit of {LIMIT_DEG:.1f} degrees; bands are 95 % intervals. "
         "POSIT and EPOSIT coincide.",
     )
-    return Section("Success against field angle", intro, (drawing, *tables))
+    return PaperSection("Success against field angle", intro, (drawing, *tables))
 
 
 def solve_by(name: str, points_in_obj: Array, pixels: Array, camera: Camera, sigma_px: Any = None) -> Solution:
@@ -89,11 +90,11 @@ def _table(title: str, angles: tuple[int, ...], found: dict[str, list[Interval]]
     return Table(title, ("M0 off the axis, deg", *SOLVERS), rows, note)
 
 
-def curves(angles: tuple[int, ...], ways: dict[str, dict[str, list[Interval]]]) -> str:
-    """One panel for each way, one curve for each solver."""
+def curves(angles: tuple[int, ...], panels: dict[str, dict[str, list[Interval]]]) -> str:
+    """One panel for each kind of points, one curve for each solver."""
     with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(1, len(ways), figsize=(10, 3.2), layout="constrained", sharey=True, squeeze=False)
-        for axis, (title, found) in zip(axes[0], ways.items(), strict=True):
+        figure, axes = plt.subplots(1, len(panels), figsize=(10, 3.2), layout="constrained", sharey=True, squeeze=False)
+        for axis, (title, found) in zip(axes[0], panels.items(), strict=True):
             axis.axvline(LIMIT_DEG, color="0.6", linewidth=0.8, linestyle="--")
             for i, (name, values) in enumerate(found.items()):
                 low, middle, high = (

@@ -18,7 +18,8 @@ from eposit.arrays import Array
 from eposit.pose import rotation_error_rad
 from pipelines.detection import Detector
 from pipelines.paper.beyond.field import LIMIT_DEG, SOLVERS, curves, solve_by
-from pipelines.paper.claims import Drawing, Section, Table
+from pipelines.paper.claims import PaperSection
+from pipelines.report.sections import Drawing, Table
 from pipelines.stages.detect import path_of
 from pipelines.statistics import percent, wilson
 
@@ -41,7 +42,7 @@ class _Seen:
         return bool(np.all(np.isfinite(self.pixels)))
 
 
-def field_of_images(folder: Path) -> Section:
+def field_of_images(folder: Path) -> PaperSection:
     """Success of each solver on detected points, for each field angle of the dataset's boards.
 
     Raises:
@@ -75,7 +76,7 @@ def field_of_images(folder: Path) -> Section:
         "linear methods pay for."
     )
     drawing = Drawing("Success on detected points", curves(angles, {"detected points": found}))
-    return Section(
+    return PaperSection(
         "Field angle in rendered pictures",
         intro,
         (drawing, Table("Success on detected points", head, tuple(rows), note)),

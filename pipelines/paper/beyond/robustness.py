@@ -10,8 +10,9 @@ from eposit import Pose
 from eposit.arrays import Array, Mask
 from eposit.pose import rotation_from_vector
 from pipelines.paper.beyond.efficiency import CAMERAS
-from pipelines.paper.claims import Section, Table
+from pipelines.paper.claims import PaperSection
 from pipelines.paper.problems import SIGMA_PX, bounds, camera_with, errors_of, information, noisy
+from pipelines.report.sections import Table
 from pipelines.statistics import percent, wilson
 from render.targets.chessboard import Target
 
@@ -28,7 +29,7 @@ POINTS = {
 SPOILS = ("none", "one moved", "two exchanged")
 
 
-def robustness(trials: int = 60, seed: int = 6) -> Section:
+def robustness(trials: int = 60, seed: int = 6) -> PaperSection:
     """Share of poses that `robust=True` recovers, and what it costs where no point is wrong."""
     head = (
         "camera",
@@ -57,7 +58,7 @@ def robustness(trials: int = 60, seed: int = 6) -> Section:
         "takes the least trimmed squares over three quarters of the points from a fixed set of triangles, then adds "
         "points while a test at 1 % an image allows. Without sigma the scatter of the points decides."
     )
-    return Section("Wrong points", intro, (Table("Recovered poses", head, tuple(rows), note),))
+    return PaperSection("Wrong points", intro, (Table("Recovered poses", head, tuple(rows), note),))
 
 
 def _trial(lens: str, points: Array, spoil: str, sigma: float | None, trials: int, seed: int) -> tuple[str, ...]:

@@ -9,8 +9,9 @@ from eposit.arrays import Array, Mask
 from eposit.pose import rotation_error_rad
 from eposit.posit.iteration import posit
 from eposit.posit.orthography import Orthography
-from pipelines.paper.claims import Claim, Section, Table, Verdict, held
+from pipelines.paper.claims import PaperSection, Statement, Verdict, holds_if
 from pipelines.paper.problems import OBJECT, SIDE_MM, at_angles, helix, turned
+from pipelines.report.sections import Table
 from pipelines.statistics import percent, wilson
 
 LIMIT_DEG = 40.0  # all points of a random problem lie inside: EPOSIT's own limit is 54.7
@@ -26,7 +27,7 @@ HEAD = (
 )  # fmt: skip
 
 
-def uniqueness(count: int = 4000, seed: int = 6) -> Section:
+def uniqueness(count: int = 4000, seed: int = 6) -> PaperSection:
     """Exact points: where the iteration ends, and whether random starts end elsewhere."""
     scenes = {
         "the paper's object on its helix": _on(helix()),
@@ -46,7 +47,9 @@ def uniqueness(count: int = 4000, seed: int = 6) -> Section:
         "one fixed point. Elsewhere it may have several, or pass the pose by, which repels it."
     )
     note = "As iterated, without the check by a triangle's poses that `solve` makes. 95 % intervals by Wilson."
-    return Section("One solution", intro, (Table("Fixed points of EPOSIT", HEAD, rows, note),), (_claim(found),))
+    return PaperSection(
+        "One solution", intro, (Table("Fixed points of EPOSIT", HEAD, rows, note),), (STATEMENT.judged(found),)
+    )
 
 
 def _on(pose: Pose) -> tuple[Orthography, Array]:
@@ -84,23 +87,22 @@ def ends(system: Orthography, truth: Array, seed: int) -> tuple[Mask, ...]:
     return single, start.converged & right, start.converged & ~right, ~start.converged, doubled
 
 
-def _claim(found: dict[str, tuple[Mask, ...]]) -> Claim:
-    near, *_, deep = found.values()
-    always = all(bool(np.all(masks[1])) and not np.any(masks[4]) for masks in found.values())
-    return Claim(
-        section="I",
-        text="The solution is unique, since it is found by iterating",
-        paper="-",
-        equations=(
-            f"on the helix one fixed point in {percent(wilson(near[0]), 0)}; of random objects of {100 * SIZES[-1]:g} "
-            f"% of their distance {percent(wilson(deep[1]), 2)} end in the pose, {percent(wilson(deep[2]), 2)} "
-            f"elsewhere, and {percent(wilson(deep[4]), 2)} have another fixed point"
-        ),
-        released="the same iteration",
-        verdict=held(always, Verdict.PARTLY),
-        why=(
-            "An iteration returns one answer, which does not make it the only one. Where the object is small and near "
-            "the axis a bound on the slope proves one fixed point; large objects can have a second, or one that repels."
-        ),
-        part="beyond",
+def _ends_text(found: dict[str, tuple[Mask, ...]]) -> str:
+    near, *_, large = found.values()
+    return (
+        f"on the helix one fixed point in {percent(wilson(near[0]), 0)}; of random objects of {100 * SIZES[-1]:g} % of "
+        f"their distance {percent(wilson(large[1]), 2)} end in the pose, {percent(wilson(large[2]), 2)} elsewhere, and "
+        f"{percent(wilson(large[4]), 2)} have another fixed point"
     )
+
+
+def _always_the_pose(found: dict[str, tuple[Mask, ...]]) -> bool:
+    return all(bool(np.all(masks[1])) and not np.any(masks[4]) for masks in found.values())
+
+
+STATEMENT = Statement(
+    "I", "The solution is unique, since it is found by iterating", "-", _ends_text, "the same iteration",
+    holds_if(_always_the_pose, Verdict.PARTLY),
+    "An iteration returns one answer, which does not make it the only one. Where the object is small and near the axis "
+    "a bound on the slope proves one fixed point; large objects can have a second, or one that repels.", "beyond",
+)  # fmt: skip

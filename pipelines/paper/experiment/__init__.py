@@ -16,10 +16,10 @@ from datasets.store.dataset import Dataset
 from eposit import Pose, Status
 from eposit.arrays import Array
 from pipelines.detection import Detector
-from pipelines.paper.claims import Drawing, Section, Table
+from pipelines.paper.claims import PaperSection, judged
 from pipelines.paper.experiment import figures
 from pipelines.paper.experiment.calibration import AT_ONCE
-from pipelines.paper.experiment.claims import Cost, Found, claims, timed
+from pipelines.paper.experiment.claims import STATEMENTS, Experiment, Found
 from pipelines.paper.experiment.pictures import (
     HARD,
     MethodResult,
@@ -31,6 +31,8 @@ from pipelines.paper.experiment.pictures import (
     estimated,
     read_pictures,
 )
+from pipelines.paper.experiment.times import Cost, timed
+from pipelines.report.sections import Drawing, Table
 
 RECIPE = "experiment"
 DETECTORS = (Detector.OPENCV_SUBPIX, Detector.EDGE_FIT)  # the first as in the paper
@@ -42,7 +44,7 @@ INTRO = (
 )
 
 
-def measure(folder: Path, tell: Callable[[str], None] = lambda _: None) -> Section:
+def measure(folder: Path, tell: Callable[[str], None] = lambda _: None) -> PaperSection:
     """Everything, from a dataset in `folder`, which is made or completed first. tell: is given a line at each step.
 
     Raises:
@@ -73,8 +75,8 @@ def dataset_in(folder: Path, tell: Callable[[str], None]) -> Dataset:
 
 
 def compare(pictures: Pictures) -> Found:
-    """Every way of estimating on the pictures."""
-    camera, way = calibrated(pictures, "calibration")
+    """What every method makes of the pictures."""
+    camera, calibration = calibrated(pictures, "calibration")
     try:
         plain: MethodResult | str = calibrated(pictures, "calibration in one call", AT_ONCE)[1]
     except cv2.error as error:
@@ -83,7 +85,7 @@ def compare(pictures: Pictures) -> Found:
     return Found(
         pictures,
         camera,
-        calibration=way,
+        calibration=calibration,
         at_once=plain,
         eposit=estimated("EPOSIT, four points", pictures, by_eposit, nominal, four),
         eposit_all=estimated("EPOSIT, all points", pictures, by_eposit, nominal),
@@ -94,7 +96,7 @@ def compare(pictures: Pictures) -> Found:
     )
 
 
-def section(found: dict[str, Found], cost: Cost) -> Section:
+def section(found: dict[str, Found], cost: Cost) -> PaperSection:
     """Tables, figures and claims; the first detector's pictures are shown one by one."""
     detector, first = next(iter(found.items()))
     pictures, shown = first.pictures, (first.calibration, first.eposit)
@@ -113,7 +115,7 @@ def section(found: dict[str, Found], cost: Cost) -> Section:
         ),
         _times(cost),
     )  # fmt: skip
-    return Section("The experiment", INTRO, items, claims(first, cost))
+    return PaperSection("The experiment", INTRO, items, judged(STATEMENTS, Experiment(first, cost)))
 
 
 def _per_picture(found: Found, detector: str) -> Table:
@@ -122,16 +124,16 @@ def _per_picture(found: Found, detector: str) -> Table:
     for i, status in enumerate(pictures.status):
         hard = HARD.get(i + 1, "")
         row = [f"{i + 1} {hard}".rstrip(), status, _number(found.calibration.used_px[i])]
-        for way in (found.eposit, found.eposit_all):
-            if way.status[i] != Status.OK:
-                row += [way.status[i], "", ""]
+        for result in (found.eposit, found.eposit_all):
+            if result.status[i] != Status.OK:
+                row += [result.status[i], "", ""]
                 continue
             row += [
-                f"{way.used_px[i]:.2f}",
-                _triple(way.rotation_rad(found.calibration.cam_from_obj)[i], 3),
-                _triple(way.shift_mm(found.calibration.cam_from_obj)[i], 0),
+                f"{result.used_px[i]:.2f}",
+                _triple(result.rotation_rad(found.calibration.cam_from_obj)[i], 3),
+                _triple(result.shift_mm(found.calibration.cam_from_obj)[i], 0),
             ]
-        row += [_pose_error(way, truth, i) for way in (found.calibration, found.eposit, found.best)]
+        row += [_pose_error(result, truth, i) for result in (found.calibration, found.eposit, found.best)]
         rows.append(tuple(row))
     head = ["picture", "detection", "calibration, px"]
     for name in ("EPOSIT 4", "EPOSIT all"):
@@ -140,22 +142,22 @@ def _per_picture(found: Found, detector: str) -> Table:
     return Table(
         f"Picture by picture, corners of {detector}", tuple(head), tuple(rows),
         "Reprojection is the root mean square distance over the points used. True errors: angle of rotation in rad, "
-        "length of the translation's error in mm. A way without an answer has its status in its row.",
+        "length of the translation's error in mm. A method without an answer has its status in its row.",
     )  # fmt: skip
 
 
 def _summary(found: Found, detector: str) -> Table:
     pictures, ordinary = found.pictures, found.pictures.ordinary
     rows: list[tuple[str, ...]] = []
-    for way in found.ways:
-        turn, shift = way.turn_rad(pictures.cam_from_obj), way.shift_mm(pictures.cam_from_obj)
-        there = np.array([status == Status.OK for status in way.status])
-        hard = [_pose_error(way, pictures.cam_from_obj, number - 1) for number in HARD]
+    for result in found.results:
+        turn, shift = result.turn_rad(pictures.cam_from_obj), result.shift_mm(pictures.cam_from_obj)
+        there = np.array([status == Status.OK for status in result.status])
+        hard = [_pose_error(result, pictures.cam_from_obj, number - 1) for number in HARD]
         rows.append(
             (
-                way.name, f"{np.sum(there)} of {len(there)}", _median(turn[ordinary]),
-                _triple(np.abs(shift[ordinary][there[ordinary]]), 1), _median(way.used_px[ordinary]),
-                _median(way.board_px[ordinary]), *hard,
+                result.name, f"{np.sum(there)} of {len(there)}", _median(turn[ordinary]),
+                _triple(np.abs(shift[ordinary][there[ordinary]]), 1), _median(result.used_px[ordinary]),
+                _median(result.board_px[ordinary]), *hard,
             )
         )  # fmt: skip
     fx, fy, cx, cy = found.camera.matrix[[0, 1, 0, 1], [0, 1, 2, 2]]
@@ -167,7 +169,7 @@ def _summary(found: Found, detector: str) -> Table:
     if isinstance(found.at_once, str):
         note += f" The calibration in one call ends in an error: {found.at_once}."
     head = (
-        "way", "answers", "rotation, rad", "x y z, mm", "reprojection, px", "of all points, px",
+        "method", "answers", "rotation, rad", "x y z, mm", "reprojection, px", "of all points, px",
         *(f"picture {number}: rotation, rad; translation, mm" for number in HARD),
     )  # fmt: skip
     return Table(
@@ -184,10 +186,10 @@ def _times(cost: Cost) -> Table:
     )  # fmt: skip
 
 
-def _pose_error(way: MethodResult, truth: Pose, i: int) -> str:
-    if way.status[i] != Status.OK:
-        return way.status[i]
-    return f"{way.turn_rad(truth)[i]:.2g}; {np.linalg.norm(way.shift_mm(truth)[i]):.2g}"
+def _pose_error(result: MethodResult, truth: Pose, i: int) -> str:
+    if result.status[i] != Status.OK:
+        return result.status[i]
+    return f"{result.turn_rad(truth)[i]:.2g}; {np.linalg.norm(result.shift_mm(truth)[i]):.2g}"
 
 
 def _number(value: float) -> str:

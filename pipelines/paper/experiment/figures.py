@@ -20,7 +20,7 @@ LIMIT_RAD, LIMITS_MM = 0.2, (50.0, 50.0, 200.0)  # the paper's
 PAPER_PX = 1.4
 
 
-def poses_figure(pictures: Pictures, ways: Sequence[MethodResult]) -> str:
+def poses_figure(pictures: Pictures, results: Sequence[MethodResult]) -> str:
     """Angles and translations of every picture, with the truth as a line."""
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(3, 2, figsize=(11, 7), layout="constrained", sharex=True)
@@ -28,22 +28,22 @@ def poses_figure(pictures: Pictures, ways: Sequence[MethodResult]) -> str:
         for i, axis in enumerate("xyz"):
             for column, values in enumerate((_angles(pictures.cam_from_obj.R), pictures.cam_from_obj.t)):
                 axes[i, column].plot(number, values[:, i], "-", color="0.6", linewidth=1, label="truth")
-            for way, mark in zip(ways, MARKS, strict=False):
-                for column, values in enumerate((_angles(way.cam_from_obj.R), way.cam_from_obj.t)):
-                    axes[i, column].plot(number, values[:, i], mark, markersize=5, fillstyle="none", label=way.name)
+            for result, mark in zip(results, MARKS, strict=False):
+                for column, values in enumerate((_angles(result.cam_from_obj.R), result.cam_from_obj.t)):
+                    axes[i, column].plot(number, values[:, i], mark, markersize=5, fillstyle="none", label=result.name)
             axes[i, 0].set_ylabel(f"r{axis}, rad")
             axes[i, 1].set_ylabel(f"{axis}, mm")
         return _finished(figure, axes)
 
 
-def differences_figure(pictures: Pictures, way: MethodResult, calibration: MethodResult) -> str:
-    """Differences of a way from the calibration, and the errors of both, with the paper's limits."""
+def differences_figure(pictures: Pictures, result: MethodResult, calibration: MethodResult) -> str:
+    """Differences of a method from the calibration, and the errors of both, with the paper's limits."""
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(3, 2, figsize=(11, 7), layout="constrained", sharex=True)
         number, truth = _numbers(pictures), pictures.cam_from_obj
         shown = (
-            (f"{way.name} - calibration", way, calibration.cam_from_obj),
-            (f"{way.name} - truth", way, truth),
+            (f"{result.name} - calibration", result, calibration.cam_from_obj),
+            (f"{result.name} - truth", result, truth),
             ("calibration - truth", calibration, truth),
         )
         for i, axis in enumerate("xyz"):
@@ -58,12 +58,12 @@ def differences_figure(pictures: Pictures, way: MethodResult, calibration: Metho
         return _finished(figure, axes)
 
 
-def reprojection_figure(pictures: Pictures, ways: Sequence[MethodResult]) -> str:
+def reprojection_figure(pictures: Pictures, results: Sequence[MethodResult]) -> str:
     """Reprojection errors of every picture over the points used, logarithmic, with the paper's mean."""
     with plt.rc_context(STYLE):
         figure, axis = plt.subplots(figsize=(9, 3.4), layout="constrained")
-        for way, mark in zip(ways, MARKS, strict=False):
-            axis.plot(_numbers(pictures), way.used_px, mark, markersize=5, fillstyle="none", label=way.name)
+        for result, mark in zip(results, MARKS, strict=False):
+            axis.plot(_numbers(pictures), result.used_px, mark, markersize=5, fillstyle="none", label=result.name)
         axis.axhline(PAPER_PX, color="0.4", linestyle="--", linewidth=0.8, label="the paper's mean of EPOSIT")
         axis.set(yscale="log", ylabel="reprojection, px RMS")
         return _finished(figure, np.array([[axis]]))

@@ -1,4 +1,4 @@
-"""The experiment's pictures, and what each way of estimating makes of them."""
+"""The experiment's pictures, and what each method makes of them."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Pictures:
 
 @dataclass(frozen=True, slots=True)
 class MethodResult:
-    """One way of estimating, on b pictures."""
+    """What one method makes of b pictures."""
 
     name: str
     status: list[str]
@@ -84,12 +84,12 @@ def read_pictures(dataset: Dataset, detector: str) -> Pictures:
 
 
 def _detection_status(statuses: list[str]) -> str:
-    bad = [status for status in statuses if status != "ok"]
+    bad = [status for status in statuses if status != Status.OK]
     return f"{len(statuses) - len(bad)} points, {bad[0]}" if bad else "ok"
 
 
 def calibrated(pictures: Pictures, name: str, calls: tuple[int, ...] = STAGED) -> tuple[Calibration, MethodResult]:
-    """OpenCV's calibration over all pictures, and its poses as a way of estimating; `calls` as for `calibrate`.
+    """OpenCV's calibration over all pictures, and its poses as those of a method; `calls` as for `calibrate`.
 
     Raises:
         cv2.error: OpenCV cannot calibrate from these corners.

@@ -15,6 +15,8 @@ from eposit.arrays import Array, Mask
 from eposit.pose import euler_error_rad
 from pipelines.adapters.registry import find_solver
 from pipelines.paper.problems import OBJECT, SIGMA_PX, camera_with, errors_of, helix
+from pipelines.stages.score import GROSS_FAILURE_FACTOR
+from pipelines.statistics import Interval, bootstrap, mean
 
 LENSES = ("perspective", "stereographic", "equidistance", "equisolid", "orthogonal")
 FISHEYES = LENSES[1:]
@@ -22,7 +24,8 @@ NOMINAL_PX = {"perspective": 1353.0} | dict.fromkeys(FISHEYES, 541.0)
 CENTRE_PX = (800.0, 600.0)  # of the image, which the paper measures theta from
 COMPONENTS = ("rx", "ry", "rz", "x", "y", "z")
 UNITS = ("deg", "deg", "deg", "mm", "mm", "mm")
-STAR_FACTOR = 2.0  # the paper's star: no solution, or a translation at least twice the true one
+ROTATION, PLACE, DEPTH = slice(0, 3), slice(3, 5), slice(5, 6)  # of the six
+MEANS_HEAD = ("camera", "method", *(f"{name}, {unit}" for name, unit in zip(COMPONENTS, UNITS, strict=True)))
 
 Estimate = Callable[["Draws"], Solution]
 
@@ -56,7 +59,7 @@ class Outcome:
     error: Array  # (seeds, poses, 6): rx, ry, rz in degrees, x, y, z in mm; NaN where there is no pose
     vector: Array  # (seeds * poses, 6): rotation vector, rad, and t, mm, as a pose's covariance has them
     failed: Mask  # (seeds, poses) no pose
-    star: Mask  # (seeds, poses) the paper's star
+    gross_failure: Mask  # (seeds, poses) no pose, or one far away: the paper's star
 
 
 def draws(lens: str, seeds: int, sigma_px: float = SIGMA_PX, path: Pose | None = None, shared: bool = True) -> Draws:
@@ -78,11 +81,11 @@ def outcome(problem: Draws, estimate: Estimate) -> Outcome:
     shift = solution.cam_from_obj.t - problem.pose.t
     length = np.linalg.norm(solution.cam_from_obj.t, axis=1)
     with np.errstate(invalid="ignore"):
-        star = failed | (length >= STAR_FACTOR * np.linalg.norm(problem.pose.t, axis=1))
+        gross = failed | (length >= GROSS_FAILURE_FACTOR * np.linalg.norm(problem.pose.t, axis=1))
     error = np.where(failed[:, None], np.nan, np.hstack((angles, shift)))
     shape = (problem.seeds, -1)
     return Outcome(
-        error.reshape(*shape, 6), errors_of(solution, problem.pose), failed.reshape(shape), star.reshape(shape)
+        error.reshape(*shape, 6), errors_of(solution, problem.pose), failed.reshape(shape), gross.reshape(shape)
     )
 
 
@@ -154,3 +157,8 @@ def with_pnpfr_root(problem: Draws, which: str) -> Solution:
 def named(name: str) -> Estimate:
     """A solver of `pipelines.adapters` with the true camera."""
     return lambda problem: find_solver(name)(OBJECT, problem.pixels, problem.camera)
+
+
+def mean_over_draws(values: Array) -> Interval:
+    """Mean over seeds and poses, with the interval over seeds. values: (seeds, poses, ...)."""
+    return bootstrap(values.reshape(len(values), -1), mean)

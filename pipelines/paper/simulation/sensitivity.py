@@ -11,8 +11,9 @@ from datasets.trajectories.helix import Helix
 from eposit import Pose, Solution, released
 from eposit.arrays import Array
 from pipelines.paper import simulation as sim
-from pipelines.paper.claims import Section, Table
+from pipelines.paper.claims import PaperSection
 from pipelines.paper.problems import OBJECT, stacked
+from pipelines.report.sections import Table
 from pipelines.statistics import bootstrap, mean
 from render.targets.chessboard import Target
 
@@ -28,20 +29,20 @@ HEAD = (
 )
 
 
-def sensitivity(seeds: int) -> Section:
+def sensitivity(seeds: int) -> PaperSection:
     """Mean errors under each change."""
     rows: list[tuple[str, ...]] = []
-    for inference, change, path, shared, ways in _variants():
+    for inference, change, path, shared, methods in _variants():
         for lens in LENSES:
             problem = sim.draws(lens, seeds, path=path, shared=shared)
-            errors = [sim.outcome(problem, way).error for way in ways]
+            errors = [sim.outcome(problem, call).error for call in methods]
             rows.append((inference, change, lens, *_cells(errors)))
     intro = (
         "The paper does not state the range of t, its step, the start angles, whether the lenses share their noise, or "
         "where the principal point enters. Our reading, which reproduces its numbers, and what changes without it."
     )
     note = "Mean errors with 95 % intervals over the draws; of x and y, and of the rotation, the largest component."
-    return Section("Our inferences", intro, (Table("Sensitivity", HEAD, tuple(rows), note),))
+    return PaperSection("Our inferences", intro, (Table("Sensitivity", HEAD, tuple(rows), note),))
 
 
 def _variants() -> list[tuple[str, str, Pose | None, bool, tuple[sim.Estimate, sim.Estimate]]]:

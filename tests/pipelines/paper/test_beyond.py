@@ -12,7 +12,7 @@ from pipelines.paper.beyond.efficiency import bound, more_points
 from pipelines.paper.beyond.field import SOLVERS, WIDE, field
 from pipelines.paper.beyond.field_images import field_of_images
 from pipelines.paper.beyond.uniqueness import ends, random_problems, uniqueness
-from pipelines.paper.claims import Drawing, Table, Verdict
+from pipelines.paper.claims import Verdict
 from pipelines.paper.problems import (
     NORMAL_MEDIAN,
     OBJECT,
@@ -23,6 +23,7 @@ from pipelines.paper.problems import (
     information,
     turned,
 )
+from pipelines.report.sections import Drawing, Table
 from tests.cameras import helix_pose
 
 

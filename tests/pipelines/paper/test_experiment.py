@@ -10,10 +10,10 @@ from datasets.plan import plan
 from datasets.recipe.model import load_recipe, parse_recipe, values
 from eposit import Pose
 from eposit.pose import tilt_rad
-from pipelines.paper.claims import Drawing, Table
 from pipelines.paper.experiment import compare, section
-from pipelines.paper.experiment.claims import Cost
 from pipelines.paper.experiment.pictures import HARD, Pictures, by_eposit, estimated
+from pipelines.paper.experiment.times import Cost
+from pipelines.report.sections import Drawing, Table
 from pipelines.statistics import Interval
 from tests.datasets.trajectories.test_trajectories import BASE
 
@@ -72,10 +72,10 @@ def test_the_calibration_finds_the_true_camera_and_poses(pictures, found):
 
 
 def test_a_picture_without_a_board_keeps_its_row(found, pictures):
-    for way in found.ways:
-        assert len(way.status) == 30
-        assert way.status[12] == "points_missing"
-        assert np.all(np.isnan(way.cam_from_obj.t[12]))
+    for result in found.results:
+        assert len(result.status) == 30
+        assert result.status[12] == "points_missing"
+        assert np.all(np.isnan(result.cam_from_obj.t[12]))
     exact = dataclasses.replace(pictures, nominal=pictures.true)
     assert estimated("x", exact, by_eposit, exact.true, exact.four).status[3] == "ok"
 
