@@ -12,7 +12,7 @@ from pipelines.report.page import REPORT
 from tests.own import image_rows, own_module
 from tests.wrong_input import assert_one_sentence, files
 
-README = (Path(__file__).resolve().parents[3] / "README.md").read_text()
+EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "own_estimator.py"
 
 
 @pytest.fixture
@@ -21,12 +21,11 @@ def own(tmp_path, monkeypatch):
 
 
 def toy():
-    """The example that the README offers for copying."""
-    (text,) = re.findall(r"```python\n(# myposes\.py.*?)```", README, flags=re.S)
-    return text
+    """The example that the guide offers for copying."""
+    return EXAMPLE.read_text()
 
 
-def test_the_readmes_estimator_comes_out_in_tables_and_report(own, root, cli, content):
+def test_the_example_estimator_comes_out_in_tables_and_report(own, root, cli, content):
     name = f"{own(toy())}:estimate"
     assert cli("estimate", root, "--estimator", name, "-q").code == 0
     assert cli("score", root, "-q").code == 0
