@@ -77,7 +77,7 @@ def find_circle(image: Grey, board: BoardMap, blur_px: float, contrast: float, t
 
 
 def _beforehand(contrast: float, height: float) -> Prior:
-    """PoseBatch of the shape, and mean and spread of all that `fit_disc` fits; what is not known has a wide spread.
+    """What is known of the circle before its pixels are looked at; what is not known has a wide spread.
 
     height: of the circle above the board, radii.
     """

@@ -16,7 +16,7 @@ PER_DRAW = 4  # levels of 16 bits in a draw of 64
 def electron_noise(
     linear: NDArray[np.float32], full_well_e: float, read_noise_e: float, bits: BitGenerator
 ) -> NDArray[np.float32]:
-    """FrameContext and read noise of light, both as shares of full scale, any shape.
+    """Shot and read noise of light, both as shares of full scale, any shape.
 
     They are one gaussian with the right mean and variance. Above twenty electrons that is all that can be told of
     Poisson's law; below, its skewness is lost, and the read noise covers it.
