@@ -54,7 +54,8 @@ def measured(recipe: Recipe, poses: int, only: Sequence[str], memory_frames: int
     for name in only:
         if name not in known:
             raise UserError(f"unknown part {name!r}; choose one of {', '.join(known)}")
-    with Progress(console=Console(stderr=True)) as progress:
+    console = Console(stderr=True)  # stdout is the table's; a log or a pipe wants no bar, and an error stands alone
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
         if memory_frames is not None:
             bar = progress.add_task("memory", total=memory_frames)
             return list(memory.measure(recipe, memory_frames, lambda done: progress.advance(bar, done)))
