@@ -10,7 +10,7 @@ from typing import Any
 import typer
 
 from datasets.errors import UserError
-from pipelines.commands import stages, tools
+from pipelines.commands import nightly, stages, tools
 
 USER_ERROR, INTERRUPTED = 2, 130
 ABOUT = "Rendered images of a chessboard through exact fish-eye cameras, detected, solved and scored against truth."
@@ -24,6 +24,7 @@ COMMANDS: tuple[tuple[Callable[..., None], str], ...] = (
     (stages.score, "score out/demo --poses poses.csv --name theirs"),
     (stages.report, "report out/demo"),
     (stages.demo, "demo --out out/demo"),
+    (nightly.compare, "compare out/before out/after"),
     (tools.verify, "verify out/demo"),
     (tools.doctor, "doctor"),
     (tools.bench, "bench demo --only render --only solver --out bench.md"),
