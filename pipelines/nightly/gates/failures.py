@@ -1,7 +1,7 @@
 """Gate `failures`: frames without corners, or without a pose, that had them before.
 
-On the pinned pictures a new failure is a fact and no sample: nothing but the code has changed. On fresh views both sides
-are new, and only their counts can be compared.
+On the pinned pictures a new failure is a fact and no sample: nothing but the code has changed. On fresh views it may be
+chance, and only counts can be compared.
 """
 
 from __future__ import annotations
