@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 import os
+import socket
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +18,7 @@ from datasets.errors import UserError
 from pipelines.engines.engine import Result, Task, check_workers
 
 RETRIES = 5  # of a task whose process or node was lost
+CONNECT_S = 10.0
 STORE_BYTES = 100 * 2**20  # Ray's shared memory on this machine: results are a line of text at most
 
 
@@ -65,6 +67,23 @@ class RayEngine:
         finally:
             for reference in waiting:
                 ray.cancel(reference)
+
+
+def check_address(address: str) -> None:
+    """Refuse an address where nobody answers, at once: Ray itself would try for minutes.
+
+    Raises:
+        UserError: another form than host:port, or no answer.
+    """
+    host, _, port = address.rpartition(":")
+    if not (host and port.isdecimal() and port.isascii()) or "/" in host:
+        raise UserError(f"address {address!r} is not usable; give --ray-address HOST:PORT of the cluster's head")
+    try:
+        socket.create_connection((host.strip("[]"), int(port)), CONNECT_S).close()
+    except (OSError, OverflowError, UnicodeError) as error:
+        raise UserError(
+            f"nobody answers at {address} ({error}); start Ray there with `ray start --head`, or correct --ray-address"
+        ) from None
 
 
 def _run_in(folder: str, run_one: Callable[[Task], Result], task: Task) -> Result:
