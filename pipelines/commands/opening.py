@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -83,7 +84,8 @@ def complete_manifest(dataset: Dataset) -> None:
     with ExitStack() as stack:
         try:
             stack.enter_context(hold(dataset.root))
-        except HeldError:
+        except HeldError as error:
+            print(f"the manifest stays as it is, as {error}", file=sys.stderr)
             return
         dataset.write_manifest()
 
