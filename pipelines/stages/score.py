@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from pathlib import Path
 
 import numpy as np
@@ -18,9 +19,9 @@ KEY = ("frame_id", "solver", "point_source", "assumed_camera", "point_set", "noi
 GROSS_FAILURE_FACTOR = 2.0  # the paper's star: "at least twice larger than the ground truth"
 
 
-def targets(dataset: Dataset) -> list[Path]:
-    """Estimate shards, each of which gets a shard of scores."""
-    return dataset.shards("estimates")
+def targets(dataset: Dataset, indices: Container[int]) -> list[Path]:
+    """Estimate shards of some numbers, each of which gets a shard of scores."""
+    return [path for path in dataset.shards("estimates") if dataset.index_of(path) in indices]
 
 
 def is_done(dataset: Dataset, estimates: Path) -> bool:
