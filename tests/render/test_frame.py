@@ -12,7 +12,7 @@ from eposit.pose import rotation_from_euler
 from render import backend
 from render.analytic.image_circle import lens_coverage
 from render.frame import render_frame
-from render.light import Light, lamp_irradiance
+from render.light import Light
 from render.region import target_region
 from render.sensor.develop import SensorModel, develop
 from render.targets.chessboard import Target
@@ -101,23 +101,6 @@ def test_developed_picture_is_that_of_4096_path_traced_rays(lens, focal, tilt, d
     )
     assert np.abs(a - b).max() <= 1
     assert abs(np.mean(a - b)) < 0.05
-
-
-def test_lamp_irradiance_is_the_polygon_formula():
-    """Lambert's closed form for a polygon of unit radiance, from Baum et al. 1989."""
-    points = np.array([[0.0, 0.0, 0.0], [400.0, 250.0, 0.0], [900.0, 600.0, 0.0]])
-    found = lamp_irradiance(TARGET, LIGHT, points, 6, shadowed=False)
-    midpoint = lamp_irradiance(TARGET, LIGHT, points, 48, shadowed=True)  # the shade is elsewhere
-    for point, value, rough in zip(points, found, midpoint, strict=True):
-        corners = LIGHT.lamp_corners(TARGET) - point
-        unit = corners / np.linalg.norm(corners, axis=1, keepdims=True)
-        total = np.zeros(3)
-        for a, b in zip(unit, np.roll(unit, -1, axis=0), strict=True):
-            cross = np.cross(a, b)
-            total += np.arccos(a @ b) * cross / np.linalg.norm(cross)
-        assert value == pytest.approx(abs(0.5 * total @ [0, 0, -1]), rel=1e-11)  # six Gauss nodes on 0.31 rad
-        # Midpoint rule, 48^2 points on 0.31 rad: (0.31 / 48)^2 / 24 times the bend of cos^4 on both axes, 8: 1.4e-5.
-        assert rough == pytest.approx(abs(0.5 * total @ [0, 0, -1]), rel=3e-5)
 
 
 def test_blocked_share_far_and_below():
