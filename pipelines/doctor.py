@@ -69,4 +69,4 @@ def _render() -> Check:
         )
     except backend.BackendError as error:
         return Check("rendering", False, str(error))
-    return Check("rendering", True, f"a region of {linear.region[2]} x {linear.region[3]} px came out")
+    return Check("rendering", True, f"a region of {linear.region.width} x {linear.region.height} px came out")

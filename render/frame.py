@@ -13,12 +13,13 @@ import numpy as np
 from eposit import Camera, Pose
 from render import backend
 from render.analytic.image_circle import lens_coverage
-from render.analytic.integrate import trace
+from render.analytic.integrate import integrate_region
 from render.light import Light
 from render.pathtraced.fisheye import sensor_dict
 from render.pathtraced.scene import reference_scene
-from render.region import Image, Region, target_region
+from render.region import Image, target_region
 from render.targets.chessboard import Target
+from render.targets.image_region import Region
 
 REFERENCE_RAYS = 1 << 24  # in flight while the reference is traced
 
@@ -34,8 +35,7 @@ class LinearImage:
     def full(self, camera: Camera) -> Image:
         """(camera.height, camera.width) radiance of the whole picture."""
         picture = (self.background * lens_coverage(camera)).astype(np.float32)
-        x, y, width, height = self.region
-        picture[y : y + height, x : x + width] = self.radiance
+        picture[self.region.pixels] = self.radiance
         return picture
 
 
@@ -57,12 +57,11 @@ def render_frame(
     seed: of the reference's rays, 32 bits; ours has no random numbers.
     """
     region = target_region(target, camera, cam_from_obj) if region is None else region
-    x, y, width, height = region
     if not reference:
-        radiance = trace(target, light, camera, cam_from_obj, region, samples)
+        radiance = integrate_region(target, light, camera, cam_from_obj, region, samples)
         return LinearImage(radiance, region, light.background)
     film = _reference(target, light, camera, cam_from_obj, region, samples, seed)
-    behind = np.maximum(lens_coverage(camera)[y : y + height, x : x + width] - film[..., 1], 0.0)
+    behind = np.maximum(lens_coverage(camera)[region.pixels] - film[..., 1], 0.0)
     radiance = film[..., 0] + np.float32(light.background) * behind
     return LinearImage(radiance.astype(np.float32), region, light.background)
 
@@ -76,7 +75,7 @@ def _reference(
     rows = max(1, REFERENCE_RAYS // (width * samples))
     bands: list[Image] = []
     for top in range(y, y + height, rows):
-        band = (x, top, width, min(rows, y + height - top))
+        band = Region(x, top, width, min(rows, y + height - top))
         sensor = mi.load_dict(sensor_dict(camera, cam_from_obj, band, samples))
         keyed = (seed + top) & 0xFFFFFFFF  # no two bands share their random numbers
         bands.append(np.array(mi.render(reference_scene(target, light), sensor=sensor, spp=samples, seed=keyed)))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from eposit.arrays import Array
 from render.targets.chessboard import Target
+from render.targets.image_region import Region
 
 Grey = NDArray[np.uint8]
 
@@ -99,24 +100,24 @@ def _worth_trying(part: Grey, inner: tuple[int, int]) -> bool:
 
 
 def _region_of(image: Grey) -> tuple[Grey, Array]:
-    x, y, width, height = textured_region(image)
-    return image[y : y + height, x : x + width], np.array([x, y], np.float64)
+    region = textured_region(image)
+    return image[region.pixels], np.array([region.x, region.y], np.float64)
 
 
-def textured_region(image: Grey) -> tuple[int, int, int, int]:
-    """x, y, width, height of the pixels with strong edges and a margin; the whole image if there are none."""
+def textured_region(image: Grey) -> Region:
+    """The pixels with strong edges and a margin; the whole image if there are none."""
     small = cv2.resize(image, None, fx=1.0 / DECIMATION, fy=1.0 / DECIMATION, interpolation=cv2.INTER_LINEAR)
     gradient = cv2.morphologyEx(small, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))
     strong = gradient > max(LEAST_GRADIENT, int(gradient.max()) // 3)
     columns, rows = np.flatnonzero(strong.any(axis=0)), np.flatnonzero(strong.any(axis=1))
     if not len(columns):
-        return 0, 0, image.shape[1], image.shape[0]
+        return Region.whole(image.shape[1], image.shape[0])
     x0, y0 = (max(0, DECIMATION * int(line[0]) - REGION_MARGIN_PX) for line in (columns, rows))
     x1, y1 = (
         min(size, DECIMATION * (int(line[-1]) + 1) + REGION_MARGIN_PX)
         for line, size in ((columns, image.shape[1]), (rows, image.shape[0]))
     )
-    return x0, y0, x1 - x0, y1 - y0
+    return Region.between((x0, y0), (x1, y1))
 
 
 def _ordered(image: Grey, corners: Array, target: Target) -> Array | None:

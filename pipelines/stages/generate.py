@@ -21,6 +21,7 @@ from eposit.pose import tilt_rad
 from pipelines.engines.background import overlapped
 from render.frame import LinearImage, render_frame
 from render.sensor.develop import FrameContext, develop
+from render.targets.image_region import Region
 
 
 def is_done(dataset: Dataset, index: int) -> bool:
@@ -77,13 +78,11 @@ def _finish(dataset: Dataset, frame: Frame, linear: LinearImage, is_new: bool) -
             write_linear(linear, camera, dataset.root / relative, linear_key(recipe, frame))
         except OSError as error:
             raise refused(dataset.root / relative, error) from error
-    shot = FrameContext(recipe.target, camera, frame.cam_from_obj, frame.rate, linear.region, frame.sensor_seed)
-    image = develop(linear.full(camera), frame.sensor, shot)
+    context = FrameContext(recipe.target, camera, frame.cam_from_obj, frame.rate, linear.region, frame.sensor_seed)
+    image = develop(linear.full(camera), frame.sensor, context)
     coefficients = np.zeros(4)
     coefficients[: len(spec.coefficients)] = spec.coefficients
-    region = dict(
-        zip(("region_x_px", "region_y_px", "region_width_px", "region_height_px"), linear.region, strict=True)
-    )
+    region = dict(zip((f"region_{a}_px" for a in Region._fields), linear.region, strict=True))
     pose = {
         name: values[0] for name, values in pose_columns(frame.cam_from_obj.R[None], frame.cam_from_obj.t[None]).items()
     }

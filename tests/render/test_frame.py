@@ -17,6 +17,7 @@ from render.region import target_region
 from render.sensor.develop import SensorModel, develop
 from render.targets.chessboard import Target
 from render.targets.disc_shade import blocked_share
+from render.targets.image_region import Region
 
 TARGET, LIGHT = Target(), Light()
 CAMERA = Camera(lens="orthogonal", fx=180.0, fy=180.5, cx=201.3, cy=149.2, width=400, height=300)
@@ -33,7 +34,7 @@ def test_region_has_the_bits_of_the_whole_picture(camera):
     part = render_frame(TARGET, LIGHT, camera, pose(), samples=16)
     assert part.region == region
     assert region[2] * region[3] < 0.8 * camera.width * camera.height
-    whole = render_frame(TARGET, LIGHT, camera, pose(), samples=16, region=(0, 0, camera.width, camera.height))
+    whole = render_frame(TARGET, LIGHT, camera, pose(), samples=16, region=Region.whole(camera.width, camera.height))
     np.testing.assert_array_equal(part.full(camera), whole.radiance)
 
 
@@ -53,10 +54,9 @@ def test_standard_cells_give_the_mean_of_the_pixel(lens, focal, tilt, depth):
     # Eight times the resolution: its pixels are parts of ours, and all of its edges are its own.
     cx, cy = (8.0 * c + 3.5 for c in (camera.cx, camera.cy))
     fine_camera = camera.replace(fx=8 * camera.fx, fy=8 * camera.fy, cx=cx, cy=cy, width=3200, height=2400)
-    x, y, width, height = ours.region
-    region = (8 * x, 8 * y, 8 * width, 8 * height)
+    region = Region(*(8 * value for value in ours.region))
     fine = render_frame(TARGET, LIGHT, fine_camera, pose(tilt, depth), samples=64, region=region)
-    mean = fine.radiance.reshape(height, 8, width, 8).mean(axis=(1, 3), dtype=np.float64)
+    mean = fine.radiance.reshape(ours.region.height, 8, ours.region.width, 8).mean(axis=(1, 3), dtype=np.float64)
     grey = 255.0 * 0.8 * np.abs(ours.radiance - mean)
     # Where edges meet within a cell of 1/64 pixel, their product may be wrong by a third of it: 0.3 / 64 of 150 grey
     # levels in each such cell, of which a pixel of a steep board has two or three. A missed edge shows as 10 and more.

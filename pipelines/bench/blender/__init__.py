@@ -29,7 +29,8 @@ from pipelines.bench.table import Figure, Row, compared
 from pipelines.bench.timing import Times, in_turn, mean_of
 from render import backend
 from render.frame import LinearImage
-from render.region import Image, Region, target_region
+from render.region import Image, target_region
+from render.targets.image_region import Region
 
 PART = "blender"
 SAMPLES = 64
