@@ -15,7 +15,7 @@ from datasets.schema import ESTIMATES
 from datasets.store.images import decode_png
 from eposit import Camera, Pose, Solution
 from eposit.arrays import Array
-from render.targets.chessboard import Target
+from render.targets import Target
 
 LEAST_SIDE_PX = 16
 

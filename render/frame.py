@@ -18,7 +18,7 @@ from render.light import Light
 from render.pathtraced.fisheye import sensor_dict
 from render.pathtraced.scene import reference_scene
 from render.region import Image, target_region
-from render.targets.chessboard import Target
+from render.targets.chessboard import Chessboard
 from render.targets.image_region import Region
 
 REFERENCE_RAYS = 1 << 24  # in flight while the reference is traced
@@ -40,7 +40,7 @@ class LinearImage:
 
 
 def render_frame(
-    target: Target,
+    target: Chessboard,
     light: Light,
     camera: Camera,
     cam_from_obj: Pose,
@@ -67,7 +67,7 @@ def render_frame(
 
 
 def _reference(
-    target: Target, light: Light, camera: Camera, cam_from_obj: Pose, region: Region, samples: int, seed: int
+    target: Chessboard, light: Light, camera: Camera, cam_from_obj: Pose, region: Region, samples: int, seed: int
 ) -> Image:
     """(height, width, 2) radiance and share of hits by Mitsuba, a band of rows at a time to bound the memory."""
     mi = backend.load()

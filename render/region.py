@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eposit import Camera, Pose
-from render.targets.chessboard import Target
+from render.targets import Target
 from render.targets.image_region import Region
 
 Image = NDArray[np.float32]  # (height, width) linear radiance

@@ -23,7 +23,7 @@ from datasets.trajectories import TRAJECTORIES, Trajectory
 from datasets.trajectories.helix import Helix
 from render.light import Light
 from render.sensor.presets import DEFAULT_REGIME, SensorModel, regimes
-from render.targets.chessboard import CIRCLE, Target
+from render.targets.chessboard import CIRCLE, Chessboard
 
 RECIPES = resources.files("datasets") / "recipes"
 SUFFIX = ".toml"
@@ -53,7 +53,7 @@ class Recipe(BaseModel):
             "the outermost corners of the first row and column and the circle if left out"
         ),
     ] = None
-    target: Annotated[Target, Field(description="the board and its circle")] = Target()
+    target: Annotated[Chessboard, Field(description="the board and its circle")] = Chessboard()
     light: Annotated[Light, Field(description="lamp, surrounding, background")] = Light()
     sensor: Annotated[SensorModel, Field(description="linear light to 8 bits")] = SensorModel()
     trajectory: Annotated[Trajectory, Field(discriminator="kind", description="the target's path")] = Helix()
@@ -83,7 +83,7 @@ class Recipe(BaseModel):
         return QUALITIES[self.quality].samples if self.samples is None else self.samples
 
     def four_indices(self) -> list[int]:
-        """Rows in `Target.points` of the four points, M0 first."""
+        """Rows in `Chessboard.points` of the four points, M0 first."""
         across, down = self.target.inner
         four = ((0, 0), (across - 1, 0), (0, down - 1), CIRCLE) if self.four is None else self.four
         return [self.target.index(point) for point in four]

@@ -10,7 +10,7 @@ import numpy as np
 from datasets.trajectories.view import MAX_POSES, SPEED_MEANING, TURN_MEANING, check_hand
 from eposit import Pose
 from eposit.pose import rotation_from_vector
-from render.targets.chessboard import Target
+from render.targets import Target
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

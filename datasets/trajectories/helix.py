@@ -12,7 +12,7 @@ from eposit import Pose
 from eposit.arrays import Array
 from eposit.pose import rotation_error_vector, rotation_from_euler
 from render.sensor.motion import PoseRate
-from render.targets.chessboard import Target
+from render.targets import Target
 
 HALF_STEP_S = 0.005  # of the helix's central difference: rounding and curvature both stay below 1e-9 of the rate
 

@@ -12,7 +12,7 @@ from datasets.trajectories.view import MAX_POSES, SPEED_MEANING, TURN_MEANING, c
 from eposit import Pose
 from eposit.pose import rotation_from_euler
 from render.sensor.presets import SensorModel
-from render.targets.chessboard import Target
+from render.targets import Target
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -12,7 +12,7 @@ from datasets.trajectories.view import MAX_POSES, SPEED_MEANING, TURN_MEANING, c
 from eposit import Camera, Pose
 from eposit.arrays import Array
 from eposit.pose import rotation_from_vector
-from render.targets.chessboard import Target
+from render.targets import Target
 
 MAX_TRIES = 2000
 Range = tuple[float, float]

@@ -9,7 +9,7 @@ import numpy as np
 from eposit import Pose
 from eposit.arrays import Array
 from render.sensor.motion import PoseRate
-from render.targets.chessboard import Target
+from render.targets import Target
 
 MAX_POSES = 1_000_000
 SPEED_MEANING = "speed of the hand-held board's centre in a random direction, mm/s; 0 stands still"

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eposit.arrays import Array
-from render.targets.chessboard import Target
+from render.targets.chessboard import Chessboard
 from render.targets.image_region import Region
 
 Grey = NDArray[np.uint8]
@@ -32,11 +32,11 @@ LEAST_GRADIENT = 16  # grey values between neighbours that count as texture
 class Found:
     """A complete board in an image, to about a pixel."""
 
-    corners_px: Array  # (n, 2) in the order of `Target.corners`
+    corners_px: Array  # (n, 2) in the order of `Chessboard.corners`
     finder: str  # which finder saw it
 
 
-def find_board(image: Grey, target: Target) -> Found | None:
+def find_board(image: Grey, target: Chessboard) -> Found | None:
     """The board's corners, or None if no finder sees a complete board that can be put in order."""
     for name, finder in FINDERS.items():
         corners = finder(image, target.inner)
@@ -48,7 +48,7 @@ def find_board(image: Grey, target: Target) -> Found | None:
     return None
 
 
-def find_sector_based(image: Grey, target: Target) -> Found | None:
+def find_sector_based(image: Grey, target: Chessboard) -> Found | None:
     """The board as `cv2.findChessboardCornersSB` alone sees it, to its own accuracy."""
     corners = _sector_based(image, target.inner)
     ordered = None if corners is None else _ordered(image, corners.reshape(-1, 2), target)
@@ -120,7 +120,7 @@ def textured_region(image: Grey) -> Region:
     return Region.between((x0, y0), (x1, y1))
 
 
-def _ordered(image: Grey, corners: Array, target: Target) -> Array | None:
+def _ordered(image: Grey, corners: Array, target: Chessboard) -> Array | None:
     """Corners in the target's order: x to y turns as the image's axes do, and the first square is the black one."""
     across, down = target.inner
     grid = corners.reshape(down, across, 2)

@@ -10,7 +10,7 @@ from eposit import Camera, Pose, Solution
 from eposit.arrays import Array, Mask
 from eposit.pose import rotation_error_vector, rotation_from_vector
 from eposit.refine.weights import covariance, normal_equations, whitening
-from render.targets.chessboard import Target
+from render.targets.chessboard import Chessboard
 
 OBJECT = np.array([(0.0, 0.0, 0.0), (200.0, 0.0, 0.0), (0.0, 200.0, 0.0), (0.0, 0.0, -50.0)])  # the paper's, mm
 SIGMA_PX = 0.4  # the paper's noise
@@ -45,8 +45,12 @@ def stacked(poses: list[Pose]) -> Pose:
 
 def helix(step: float = 1.0) -> Pose:
     """The paper's 361 poses of M0 on its helix, or every `step` seconds."""
-    path, target = Helix(point="origin", step=step), Target()
-    return stacked([path.cam_from_obj(time, target) for time in path.times()])
+    return poses_on(Helix(point="origin", step=step))
+
+
+def poses_on(path: Helix) -> Pose:
+    """A helix's poses of the paper's board, one for each of its times."""
+    return stacked([path.cam_from_obj(time, Chessboard()) for time in path.times()])
 
 
 def repeated(pose: Pose, draws: int) -> Pose:

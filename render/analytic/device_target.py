@@ -10,7 +10,7 @@ import numpy as np
 from render import backend
 from render.device import DeviceFloat
 from render.light import Light, shading_map, shadow_radius
-from render.targets.chessboard import Target
+from render.targets.chessboard import Chessboard
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ class DeviceTarget:
 
 
 @functools.lru_cache(maxsize=4)
-def device_target(target: Target, light: Light) -> DeviceTarget:
+def device_target(target: Chessboard, light: Light) -> DeviceTarget:
     """Upload the target and the map of its light, once."""
     mi, dr = backend.load(), backend.jit()
 

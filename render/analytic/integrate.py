@@ -24,7 +24,7 @@ from render.analytic.image_circle import device_coverage
 from render.analytic.rays import DeviceCamera, device_camera
 from render.device import DeviceBool, DeviceFloat, DeviceIndex, DeviceInt
 from render.light import Light
-from render.targets.chessboard import Target
+from render.targets.chessboard import Chessboard
 from render.targets.image_region import Region
 
 CHUNK = 1 << 23  # cells in flight; a cell takes 8 bytes
@@ -32,7 +32,7 @@ ONE_EDGE_CELLS = 4  # a single straight edge needs one cell; four follow its ben
 
 
 def integrate_region(
-    target: Target, light: Light, camera: Camera, cam_from_obj: Pose, region: Region, samples: int
+    target: Chessboard, light: Light, camera: Camera, cam_from_obj: Pose, region: Region, samples: int
 ) -> NDArray[np.float32]:
     """(height, width) mean radiance of the pixels of a region.
 

@@ -13,18 +13,18 @@ import numpy as np
 from render import backend
 from render.device import DeviceScene
 from render.light import Light, reference_irradiance
-from render.targets.chessboard import Target
+from render.targets.chessboard import Chessboard
 
 
 @functools.lru_cache(maxsize=4)
-def bare_scene(target: Target) -> DeviceScene:
+def bare_scene(target: Chessboard) -> DeviceScene:
     """The target's shapes and reflectance without any light, for rays that only ask what they hit."""
     mi = backend.load()
     return mi.load_dict({"type": "scene", "board": _board(target), "circle": _circle(target)})
 
 
 @functools.lru_cache(maxsize=4)
-def reference_scene(target: Target, light: Light) -> DeviceScene:
+def reference_scene(target: Chessboard, light: Light) -> DeviceScene:
     """The same board under a real lamp and a real surrounding, for Mitsuba's own integrator: the oracle."""
     mi = backend.load()
     corners = light.lamp_corners(target)
@@ -51,14 +51,14 @@ def reference_scene(target: Target, light: Light) -> DeviceScene:
     )
 
 
-def radiances(target: Target, light: Light) -> tuple[float, float]:
+def radiances(target: Chessboard, light: Light) -> tuple[float, float]:
     """Radiance of the lamp and of the surrounding that give the board's white at its centre radiance 1."""
     lamp, ambient = reference_irradiance(target, light)
     lamp_radiance = (1.0 - light.ambient_share) * np.pi / target.white / lamp
     return float(lamp_radiance), light.ambient_share / target.white / ambient
 
 
-def _board(target: Target) -> dict[str, Any]:
+def _board(target: Chessboard) -> dict[str, Any]:
     mi = backend.load()
     x0, x1, y0, y1 = target.extent_mm
     transform = mi.ScalarTransform4f
@@ -86,7 +86,7 @@ def _board(target: Target) -> dict[str, Any]:
     }
 
 
-def _circle(target: Target) -> dict[str, Any]:
+def _circle(target: Chessboard) -> dict[str, Any]:
     transform = backend.load().ScalarTransform4f
     radius = target.circle_radius_mm
     return {

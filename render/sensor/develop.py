@@ -19,7 +19,7 @@ from render.sensor.motion_blur import motion_blurred
 from render.sensor.noise import electron_noise
 from render.sensor.optics import disc_kernel, normalised_axes, vignetting_gain
 from render.sensor.presets import SensorModel
-from render.targets.chessboard import Target
+from render.targets import Target
 from render.targets.image_region import Region
 
 MAX_GREY = 255.0

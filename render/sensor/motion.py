@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from eposit import Camera, Pose
 from eposit.arrays import Array
 from eposit.pose import rotation_from_vector
-from render.targets.chessboard import Target
+from render.targets import Target
 from render.targets.image_region import Region
 
 STEP_PX = 16  # between the pixels where the motion is computed; it is bilinear between them

@@ -20,7 +20,7 @@ MAX_SQUARES, MAX_MARGIN = 24, 3.0  # the map of the light has 100 x 100 points i
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Target:
+class Chessboard:
     """Chessboard with a raised circle.
 
     Raises:
@@ -138,22 +138,6 @@ class Target:
         ]
         border = np.column_stack((np.vstack(sides), np.zeros(4 * steps)))
         return np.vstack((border, self.circle_rim(steps)))
-
-    def edges(self, steps: int = 33) -> list[Array]:
-        """Lines (n, 3), mm, where the target's brightness jumps: borders of squares and board, the circle's rim."""
-        x0, x1, y0, y1 = self.extent_mm
-        s = np.linspace(0.0, 1.0, steps)
-        left, top = -self.square_mm, -self.square_mm
-        right, bottom = left + self.columns * self.square_mm, top + self.rows * self.square_mm
-        upright = [(left + i * self.square_mm, top, bottom) for i in range(self.columns + 1)] + [
-            (x0, y0, y1),
-            (x1, y0, y1),
-        ]
-        level = [(top + i * self.square_mm, left, right) for i in range(self.rows + 1)] + [(y0, x0, x1), (y1, x0, x1)]
-        lines = [np.stack((np.full(steps, x), a + (b - a) * s, 0.0 * s), axis=1) for x, a, b in upright]
-        lines += [np.stack((a + (b - a) * s, np.full(steps, y), 0.0 * s), axis=1) for y, a, b in level]
-        rim = self.circle_rim()
-        return [*lines, np.vstack((rim, rim[:1]))]
 
     def circle_rim(self, steps: int = 256) -> Array:
         """(steps, 3) points on the circle's rim, mm."""

@@ -15,11 +15,11 @@ from render.frame import render_frame
 from render.light import Light
 from render.region import target_region
 from render.sensor.develop import SensorModel, develop
-from render.targets.chessboard import Target
+from render.targets.chessboard import Chessboard
 from render.targets.disc_shade import blocked_share
 from render.targets.image_region import Region
 
-TARGET, LIGHT = Target(), Light()
+TARGET, LIGHT = Chessboard(), Light()
 CAMERA = Camera(lens="orthogonal", fx=180.0, fy=180.5, cx=201.3, cy=149.2, width=400, height=300)
 
 

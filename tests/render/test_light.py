@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from render.light import GRID_SHARE, Light, lamp_irradiance, shading_map
-from render.targets.chessboard import Target
+from render.targets.chessboard import Chessboard
 
-TARGET, LIGHT = Target(), Light()
+TARGET, LIGHT = Chessboard(), Light()
 
 
 def test_lamp_irradiance_is_the_polygon_formula():

@@ -15,7 +15,7 @@ from datasets.recipe.quality import QUALITIES
 from datasets.schema import MEANING, TABLES, dictionary
 from datasets.trajectories.helix import Helix
 from render.sensor.presets import regimes
-from render.targets.chessboard import Target
+from render.targets.chessboard import Chessboard
 
 
 def test_every_recipe_loads_and_plans():
@@ -49,7 +49,7 @@ def test_the_demo_is_the_papers_helix_with_five_lenses():
     [("origin", (0, 0, 0)), ("board_centre", (400, 250, 0)), ((-50.0, 50.0, -10.0), (-50, 50, -10))],
 )
 def test_the_trajectory_carries_the_point_it_names(point, carried):
-    pose = Helix(point=point).cam_from_obj(30.0, Target())
+    pose = Helix(point=point).cam_from_obj(30.0, Chessboard())
     where = pose.apply(np.array([carried], float))[0]
     expected = 100 * np.sqrt(2) * np.array([np.cos(np.deg2rad(75.0)), np.sin(np.deg2rad(75.0))])
     np.testing.assert_allclose(where, [*expected, 2007.5], atol=1e-9)

@@ -6,9 +6,9 @@ from eposit import Camera, Pose
 from eposit.pose import rotation_from_euler
 from render.frame import render_frame
 from render.light import Light
-from render.targets.chessboard import Target
+from render.targets.chessboard import Chessboard
 
-TARGET, LIGHT = Target(), Light()
+TARGET, LIGHT = Chessboard(), Light()
 CAMERA = Camera(lens="perspective", fx=300.0, fy=301.0, cx=201.3, cy=149.2, width=400, height=300)
 
 

@@ -17,10 +17,10 @@ from render.sensor.motion_blur import MIN_MOTION_PX, SHORT_MOTION_PX
 from render.sensor.noise import standard_normals
 from render.sensor.optics import disc_kernel, vignetting_gain
 from render.sensor.presets import SensorModel, regime_of, regimes
-from render.targets.chessboard import Target
+from render.targets.chessboard import Chessboard
 from render.targets.image_region import Region
 
-TARGET = Target()
+TARGET = Chessboard()
 CAMERA = Camera(lens="perspective", fx=400.0, fy=400.0, cx=199.5, cy=149.5, width=400, height=300)
 FACING = Pose(np.eye(3), np.array([0.0, 0.0, 2000.0]) - TARGET.board_centre)
 STILL = PoseRate(np.zeros(3), np.zeros(3))
