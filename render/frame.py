@@ -14,6 +14,7 @@ from eposit import Camera, Pose
 from render import backend
 from render.analytic.image_circle import lens_coverage
 from render.analytic.integrate import integrate_region
+from render.device import DeviceScene
 from render.light import Light
 from render.pathtraced.fisheye import sensor_dict
 from render.pathtraced.scene import reference_scene
@@ -46,37 +47,48 @@ def render_frame(
     cam_from_obj: Pose,
     *,
     samples: int,
-    seed: int = 0,
     region: Region | None = None,
-    reference: bool = False,
 ) -> LinearImage:
-    """Render one frame in linear light, float32, box filter.
+    """Render one frame in linear light, float32, box filter, by closed forms: without random numbers.
 
     samples: cells of a pixel that edges cross, a square number. region: pixels to render, by default the target's.
-    reference: Mitsuba's direct light, path traced with `samples` multijittered rays for every pixel, instead of ours.
-    seed: of the reference's rays, 32 bits; ours has no random numbers.
     """
     region = target_region(target, camera, cam_from_obj) if region is None else region
-    if not reference:
-        radiance = integrate_region(target, light, camera, cam_from_obj, region, samples)
-        return LinearImage(radiance, region, light.background)
-    film = _reference(target, light, camera, cam_from_obj, region, samples, seed)
+    radiance = integrate_region(target, light, camera, cam_from_obj, region, samples)
+    return LinearImage(radiance, region, light.background)
+
+
+def render_reference(
+    target: Chessboard,
+    light: Light,
+    camera: Camera,
+    cam_from_obj: Pose,
+    *,
+    samples: int,
+    seed: int,
+    region: Region | None = None,
+) -> LinearImage:
+    """The same frame by Mitsuba's direct light, with `samples` multijittered rays for every pixel.
+
+    seed: of the rays, 32 bits.
+    """
+    region = target_region(target, camera, cam_from_obj) if region is None else region
+    film = _path_traced(reference_scene(target, light), camera, cam_from_obj, region, samples, seed)
     behind = np.maximum(lens_coverage(camera)[region.pixels] - film[..., 1], 0.0)
     radiance = film[..., 0] + np.float32(light.background) * behind
     return LinearImage(radiance.astype(np.float32), region, light.background)
 
 
-def _reference(
-    target: Chessboard, light: Light, camera: Camera, cam_from_obj: Pose, region: Region, samples: int, seed: int
+def _path_traced(
+    scene: DeviceScene, camera: Camera, cam_from_obj: Pose, region: Region, samples: int, seed: int
 ) -> Image:
     """(height, width, 2) radiance and share of hits by Mitsuba, a band of rows at a time to bound the memory."""
     mi = backend.load()
-    x, y, width, height = region
-    rows = max(1, REFERENCE_RAYS // (width * samples))
+    rows = max(1, REFERENCE_RAYS // (region.width * samples))
     bands: list[Image] = []
-    for top in range(y, y + height, rows):
-        band = Region(x, top, width, min(rows, y + height - top))
+    for top in range(region.y, region.y + region.height, rows):
+        band = Region(region.x, top, region.width, min(rows, region.y + region.height - top))
         sensor = mi.load_dict(sensor_dict(camera, cam_from_obj, band, samples))
         keyed = (seed + top) & 0xFFFFFFFF  # no two bands share their random numbers
-        bands.append(np.array(mi.render(reference_scene(target, light), sensor=sensor, spp=samples, seed=keyed)))
+        bands.append(np.array(mi.render(scene, sensor=sensor, spp=samples, seed=keyed)))
     return np.concatenate(bands)

@@ -118,18 +118,15 @@ def _smooth_lamp(target: Chessboard, light: Light, points: Array) -> Array:
 def lamp_irradiance(target: Chessboard, light: Light, points: Array, samples: int, *, shadowed: bool) -> Array:
     """Irradiance of a lamp of unit radiance at (n, 3) points that face -z, by quadrature over the lamp's area.
 
-    samples: along each side. Gauss-Legendre where nothing casts a shadow, so that six are exact to nine digits; the
-    midpoint rule where the circle's shadow jumps within the lamp.
+    samples: along each side of the lamp. Gauss-Legendre where nothing casts a shadow, so that six are exact to nine
+    digits; the midpoint rule where the circle's shadow jumps within the lamp.
     """
     corners = light.lamp_corners(target)
     edge_a, edge_b = corners[1] - corners[0], corners[3] - corners[0]
     normal = np.cross(edge_a, edge_b)
     area = float(np.linalg.norm(normal))
     normal = normal / area
-    shares, weights = ((np.arange(samples) + 0.5) / samples, np.full(samples, 1.0 / samples))
-    if not shadowed:
-        nodes, weights = np.polynomial.legendre.leggauss(samples)
-        shares, weights = 0.5 + 0.5 * nodes, 0.5 * weights
+    shares, weights = _midpoint_rule(samples) if shadowed else _gauss_legendre_rule(samples)
     px, py, pz = np.ascontiguousarray(points.T)
     cx, cy, cz = target.circle_centre
     reach = pz - cz  # along -z from the point to the circle's plane
@@ -146,3 +143,14 @@ def lamp_irradiance(target: Chessboard, light: Light, points: Array, samples: in
             value[across * across + down * down < target.circle_radius_mm**2] = 0.0
         total += value
     return total
+
+
+def _midpoint_rule(samples: int) -> tuple[Array, Array]:
+    """(samples,) nodes and weights on [0, 1]."""
+    return (np.arange(samples) + 0.5) / samples, np.full(samples, 1.0 / samples)
+
+
+def _gauss_legendre_rule(samples: int) -> tuple[Array, Array]:
+    """(samples,) nodes and weights on [0, 1]."""
+    nodes, weights = np.polynomial.legendre.leggauss(samples)
+    return 0.5 + 0.5 * nodes, 0.5 * weights

@@ -67,6 +67,8 @@ def sensor_dict(camera: Camera, cam_from_obj: Pose, region: Region, samples: int
 def register_sensor() -> None:
     """Define and register the plugin, once in this process.
 
+    Mitsuba has no class to derive from before its variant is set, so that the class is defined in here.
+
     Raises:
         BackendError: Mitsuba cannot run here.
     """

@@ -39,15 +39,7 @@ class Chessboard:
     circle: Annotated[float, "reflectance of the circle"] = 0.04
 
     def __post_init__(self) -> None:
-        if not (4 <= self.columns <= MAX_SQUARES and 4 <= self.rows <= MAX_SQUARES):
-            raise ValueError(
-                f"target has {self.columns} x {self.rows} squares; each number must lie in 4 to {MAX_SQUARES}"
-            )
-        if (self.columns + self.rows) % 2 == 0:
-            raise ValueError(
-                f"target has {self.columns} x {self.rows} squares, which looks the same after half a turn; "
-                "make one number even and the other odd"
-            )
+        self._check_squares()
         for name in ("square_mm", "circle_radius_mm", "circle_height_mm"):
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"target {name} is {getattr(self, name)}; it must be above 0 mm")
@@ -56,6 +48,16 @@ class Chessboard:
         for name in ("white", "black", "circle"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise ValueError(f"target {name} is {getattr(self, name)}; a reflectance lies in 0 to 1")
+        self._check_circle()
+
+    def _check_squares(self) -> None:
+        given = f"target has {self.columns} x {self.rows} squares"
+        if not (4 <= self.columns <= MAX_SQUARES and 4 <= self.rows <= MAX_SQUARES):
+            raise ValueError(f"{given}; each number must lie in 4 to {MAX_SQUARES}")
+        if (self.columns + self.rows) % 2 == 0:
+            raise ValueError(f"{given}, which looks the same after half a turn; make one number even and the other odd")
+
+    def _check_circle(self) -> None:
         column, row = self.circle_square
         if not (1 <= column <= self.columns and 1 <= row <= self.rows and (column + row) % 2 == 1):
             raise ValueError(

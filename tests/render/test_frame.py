@@ -11,7 +11,7 @@ from eposit import Camera, Pose
 from eposit.pose import rotation_from_euler
 from render import backend
 from render.analytic.image_circle import lens_coverage
-from render.frame import render_frame
+from render.frame import render_frame, render_reference
 from render.light import Light
 from render.region import target_region
 from render.sensor.develop import SensorModel, develop
@@ -66,7 +66,7 @@ def test_standard_cells_give_the_mean_of_the_pixel(lens, focal, tilt, depth):
 
 def test_looked_up_light_is_mitsubas_light():
     ours = render_frame(TARGET, LIGHT, CAMERA, pose(), samples=64)
-    theirs = render_frame(TARGET, LIGHT, CAMERA, pose(), samples=256, seed=2, reference=True)
+    theirs = render_reference(TARGET, LIGHT, CAMERA, pose(), samples=256, seed=2)
     difference = 255.0 * 0.8 * (ours.radiance - theirs.radiance)
     # 256 x 4 lamp samples leave 0.7 grey levels in a white pixel, more at an edge, and 0.005 in the mean of 25000.
     assert abs(difference.mean()) < 0.03
@@ -90,7 +90,7 @@ def test_developed_picture_is_that_of_4096_path_traced_rays(lens, focal, tilt, d
     """No pixel off by more than one grey level, and the mean by less than 0.05."""
     camera = CAMERA.replace(lens=lens, fx=focal, fy=focal + 0.5)
     ours = render_frame(TARGET, LIGHT, camera, pose(tilt, depth), samples=64)
-    theirs = render_frame(TARGET, LIGHT, camera, pose(tilt, depth), samples=4096, seed=2, reference=True)
+    theirs = render_reference(TARGET, LIGHT, camera, pose(tilt, depth), samples=4096, seed=2)
     a, b = (develop(master.full(camera), SensorModel()).astype(int) for master in (ours, theirs))
     linear = 255.0 * 0.8 * (ours.radiance - theirs.radiance)
     worst = np.unravel_index(np.argmax(np.abs(linear)), linear.shape)

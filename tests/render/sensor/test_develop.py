@@ -207,7 +207,7 @@ def test_the_blur_is_the_mean_of_renders_on_the_way():
     moments = (np.arange(16) + 0.5) / 16.0 - 0.5
 
     def light(at, samples):
-        return render_frame(TARGET, Light(), camera, at, samples=samples, seed=1).full(camera)
+        return render_frame(TARGET, Light(), camera, at, samples=samples).full(camera)
 
     mean = np.mean([light(rate.moved(pose, s * 0.04), 64) for s in moments], axis=0, dtype=np.float64)
     expected = develop(mean.astype(np.float32), SensorModel()).astype(float)
