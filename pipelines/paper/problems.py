@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import norm
 
+from datasets.recipe.camera_sets import set_cameras
 from datasets.trajectories.helix import Helix
 from eposit import Camera, Pose, Solution
 from eposit.arrays import Array, Mask
@@ -22,14 +23,17 @@ NORMAL_MEDIAN = float(norm.ppf(0.75))  # of the absolute value, over the standar
 
 def camera_with(lens: str) -> Camera:
     """The paper's true camera: pinhole intrinsics for the perspective lens, fish-eye intrinsics for the others."""
-    if lens == "perspective":
-        return Camera(lens=lens, fx=1378.65, fy=1381.37, cx=807.41, cy=602.47, width=1600, height=1200)
-    return fisheye_with(lens)
+    return set_cameras("paper")[lens].true_camera()
+
+
+def nominal_camera_with(lens: str) -> Camera:
+    """The same as a user without calibration assumes it: nominal focal length and image centre."""
+    return set_cameras("paper")[lens].nominal_camera()
 
 
 def fisheye_with(lens: str) -> Camera:
     """The paper's fish-eye intrinsics with any lens."""
-    return Camera(lens=lens, fx=552.39, fy=552.69, cx=782.41, cy=613.71, width=1600, height=1200)
+    return camera_with("equidistance").replace(lens=lens)
 
 
 def cloud(n: int) -> Array:

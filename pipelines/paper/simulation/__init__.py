@@ -14,13 +14,12 @@ from eposit import Camera, Pose, Solution, Status, gpnpf, opnp, pnpfr, released
 from eposit.arrays import Array, Mask
 from eposit.pose import euler_error_rad
 from pipelines.adapters.registry import find_solver
-from pipelines.paper.problems import OBJECT, SIGMA_PX, camera_with, errors_of, helix
+from pipelines.paper.problems import OBJECT, SIGMA_PX, camera_with, errors_of, helix, nominal_camera_with
 from pipelines.stages.score import GROSS_FAILURE_FACTOR
 from pipelines.statistics import Interval, bootstrap, mean
 
 LENSES = ("perspective", "stereographic", "equidistance", "equisolid", "orthogonal")
 FISHEYES = LENSES[1:]
-NOMINAL_PX = {"perspective": 1353.0} | dict.fromkeys(FISHEYES, 541.0)
 CENTRE_PX = (800.0, 600.0)  # of the image, which the paper measures theta from
 COMPONENTS = ("rx", "ry", "rz", "x", "y", "z")
 UNITS = ("deg", "deg", "deg", "mm", "mm", "mm")
@@ -43,8 +42,7 @@ class Draws:
     @property
     def nominal(self) -> Camera:
         """Nominal focal length and image centre: a user without calibration."""
-        f = NOMINAL_PX[self.lens]
-        return self.camera.replace(fx=f, fy=f, cx=CENTRE_PX[0], cy=CENTRE_PX[1])
+        return nominal_camera_with(self.lens)
 
     @property
     def paper(self) -> Camera:
