@@ -14,7 +14,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from datasets.errors import UserError, did_you_mean
-from datasets.recipe.camera_sets import resolved
+from datasets.recipe.camera_sets import SUFFIX, resolved
 from datasets.recipe.cameras import CameraSpec
 from datasets.recipe.cameras import assumed_camera as assumed_camera
 from datasets.recipe.describe import Key, keys_of, sentence, values_of
@@ -27,7 +27,6 @@ from render.sensor.presets import DEFAULT_REGIME, SensorModel, regimes
 from render.targets.chessboard import CIRCLE, Target
 
 RECIPES = resources.files("datasets") / "recipes"
-SUFFIX = ".toml"
 
 
 class Recipe(BaseModel):

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from datasets.trajectories.view import MAX_POSES, SPEED_MEANING, TURN_MEANING, check_hand
+from datasets.trajectories.view import KIND_MEANING, MAX_POSES, SPEED_MEANING, TURN_MEANING, check_hand
 from eposit import Pose
 from eposit.pose import rotation_from_vector
 from render.targets.chessboard import Target
@@ -24,7 +24,7 @@ class FieldAngles:
         ValueError: an empty list, or a value out of range.
     """
 
-    kind: Annotated[Literal["field"], "helix, field, scatter or listed"] = "field"
+    kind: Annotated[Literal["field"], KIND_MEANING] = "field"
     field_deg: Annotated[tuple[float, ...], "angles of the board's centre from the optical axis, degrees"] = (0.0,)
     distance_mm: Annotated[tuple[float, ...], "distances of the board's centre from the camera centre, mm"] = (1500.0,)
     azimuth_deg: Annotated[

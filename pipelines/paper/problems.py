@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import norm
 
 from datasets.recipe.camera_sets import set_cameras
@@ -15,6 +16,7 @@ from render.targets.chessboard import Target
 
 OBJECT = np.array([(0.0, 0.0, 0.0), (200.0, 0.0, 0.0), (0.0, 200.0, 0.0), (0.0, 0.0, -50.0)])  # the paper's, mm
 SIGMA_PX = 0.4  # the paper's noise
+EXACT_RAD = 1e-6  # rotation error below which a pose from exact points is the true one
 DISTANCE_MM = 2000.0
 SIDE_MM = 200.0  # of the cube of more points
 CLOUD_SEED = 55
@@ -53,9 +55,14 @@ def helix(step: float = 1.0) -> Pose:
     return stacked([path.cam_from_obj(time, target) for time in path.times()])
 
 
+def taken(pose: Pose, order: NDArray[np.intp]) -> Pose:
+    """The poses of these numbers."""
+    return Pose(pose.R[order], pose.t[order])
+
+
 def repeated(pose: Pose, draws: int) -> Pose:
     """Each pose `draws` times in a row."""
-    return Pose(np.repeat(pose.R, draws, axis=0), np.repeat(pose.t, draws, axis=0))
+    return taken(pose, np.repeat(np.arange(len(pose.t)), draws))
 
 
 def at_field_angle(degrees: float, count: int, seed: int) -> Pose:
