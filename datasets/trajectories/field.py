@@ -36,12 +36,21 @@ class FieldAngles:
     turn_deg_per_s: Annotated[float, TURN_MEANING] = 10.0
 
     def __post_init__(self) -> None:
+        self._check_counts()
+        self._check_values()
+        check_hand(self.speed_mm_per_s, self.turn_deg_per_s)
+
+    def _check_counts(self) -> None:
         counted = isinstance(self.azimuth_deg, int)
         if isinstance(self.azimuth_deg, int) and self.azimuth_deg < 1:
             raise ValueError(f"trajectory azimuth_deg is {self.azimuth_deg}; give a list of angles or a count above 0")
         for name in ("field_deg", "distance_mm", *(() if counted else ("azimuth_deg",))):
             if not getattr(self, name):
                 raise ValueError(f"trajectory {name} is an empty list; give at least one")
+        if len(self.field_deg) * len(self.distance_mm) * len(self.azimuths) > MAX_POSES:
+            raise ValueError("trajectory has more than a million poses; give fewer angles or distances")
+
+    def _check_values(self) -> None:
         for angle in self.field_deg:
             if not 0.0 <= angle < 180.0:
                 raise ValueError(f"trajectory field_deg holds {angle:g}; field angles lie in 0 to below 180 degrees")
@@ -50,9 +59,6 @@ class FieldAngles:
                 raise ValueError(f"trajectory distance_mm holds {distance:g}; distances are above 0 mm")
         if not 0.0 <= self.extra_tilt_deg <= 85.0:
             raise ValueError(f"trajectory extra_tilt_deg is {self.extra_tilt_deg}; it must lie in 0 to 85 degrees")
-        check_hand(self.speed_mm_per_s, self.turn_deg_per_s)
-        if len(self.field_deg) * len(self.distance_mm) * len(self.azimuths) > MAX_POSES:
-            raise ValueError("trajectory has more than a million poses; give fewer angles or distances")
 
     @property
     def azimuths(self) -> tuple[float, ...]:

@@ -19,7 +19,7 @@ from eposit import Camera, gpnpf, opnp, pnpfr, released
 from eposit.arrays import Array
 from pipelines.adapters.registry import find_solver
 from pipelines.bench.table import Row, compared
-from pipelines.bench.timing import Times, in_turn
+from pipelines.bench.timing import in_turn
 from pipelines.paper.problems import OBJECT, camera_with, helix, noisy, taken
 
 PART = "solver, a pose of four points"
@@ -82,11 +82,7 @@ def _each_alone(solver: Solver, images: Array, camera: Camera) -> None:
 def _rows(name: str, call: Callable[[], object], count: int, loops: dict[str, Callable[[], object]]) -> Iterator[Row]:
     own, *others = in_turn(call, *loops.values(), repeats=REPEATS)
     for other, times in zip(loops, others, strict=True):
-        yield compared(PART, name, _per_pose(own, count), other, _per_pose(times, LOOPED))
-
-
-def _per_pose(times: Times, count: int) -> Times:
-    return Times(times.wall / count, times.cpu / count)
+        yield compared(PART, name, own / count, other, times / LOOPED)
 
 
 def _poselib(images: Array, camera: Camera) -> dict[str, Callable[[], object]]:

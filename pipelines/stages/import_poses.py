@@ -94,6 +94,10 @@ def read_poses(path: Path) -> dict[int, PoseResult]:
 def _columns(path: Path) -> dict[str, list[Any]]:
     """Name to values; of CSV they are text.
 
+    `csv` reads it and not `pyarrow.csv`, which guesses types (`true` becomes 1, text that is not UTF-8 becomes bytes, a
+    wrong number a column of text), keeps blanks before names and quotes, and counts lines without the empty ones: it
+    could not say which value of which line is wrong.
+
     Raises:
         UserError: a file that cannot be read.
     """
