@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from datasets.trajectories.view import PosedFrame
+from datasets.trajectories.view import KIND_MEANING, PosedFrame
 from eposit import Pose
 from eposit.arrays import Array
 from eposit.pose import rotation_error_vector, rotation_from_euler
@@ -30,7 +30,7 @@ class Helix:
         Paper, section III. The start angles and the range of t are not in its text; they are inferred from its code.
     """
 
-    kind: Annotated[Literal["helix"], "helix, field, scatter or listed"] = "helix"
+    kind: Annotated[Literal["helix"], KIND_MEANING] = "helix"
     point: Annotated[
         Literal["board_centre", "origin"] | tuple[float, float, float],
         "point of the target that the helix carries: board_centre, origin, or [x, y, z] in mm",

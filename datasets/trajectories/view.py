@@ -12,6 +12,7 @@ from render.sensor.motion import PoseRate
 from render.targets import Target
 
 MAX_POSES = 1_000_000
+KIND_MEANING = "helix, field, scatter or listed"
 SPEED_MEANING = "speed of the hand-held board's centre in a random direction, mm/s; 0 stands still"
 TURN_MEANING = "rate at which the hand-held board turns about a random axis, degrees/s"
 

@@ -38,6 +38,9 @@ class PointStatus(StrEnum):
     CIRCLE_NOT_FOUND = "circle_not_found"  # no dark disc where the board puts the circle
 
 
+STATUS_TYPE = np.dtype(f"<U{max(len(status) for status in PointStatus)}")
+
+
 @dataclass(frozen=True, slots=True)
 class Detection:
     """Points of one image in the order of `Chessboard.points`."""
@@ -71,7 +74,7 @@ def detect_points(image: Grey, target: Chessboard, detector: str = Detector.EDGE
         return _nothing(count, PointStatus.CORNERS_INCONSISTENT, found.finder)
     circle = find_circle(image, corners.board, corners.blur_px, corners.contrast, target)
     points, covariance = np.full((count, 2), np.nan), np.full((count, 2, 2), np.nan)
-    status = np.array([PointStatus.CORNERS_INCONSISTENT] * count, dtype="<U24")
+    status = np.full(count, PointStatus.CORNERS_INCONSISTENT, STATUS_TYPE)
     good = np.append(corners.consistent, circle is not None)
     points[:-1], covariance[:-1], status[-1] = corners.points_px, corners.covariance_px2, PointStatus.CIRCLE_NOT_FOUND
     if circle is not None:
@@ -96,7 +99,5 @@ def _corners(image: Grey, found_px: Array, target: Chessboard, detector: str) ->
 
 
 def _nothing(count: int, status: PointStatus, finder: str) -> Detection:
-    return Detection(
-        np.full((count, 2), np.nan), np.full((count, 2, 2), np.nan), np.array([status] * count, dtype="<U24"), finder,
-        float("nan"),
-    )  # fmt: skip
+    statuses = np.full(count, status, STATUS_TYPE)
+    return Detection(np.full((count, 2), np.nan), np.full((count, 2, 2), np.nan), statuses, finder, float("nan"))

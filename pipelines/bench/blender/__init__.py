@@ -37,7 +37,7 @@ SAMPLES = 64
 IN_A_ROW = 20  # frames of ours against one of Blender's, which takes seconds
 VARIABLE = "EPOSIT_BLENDER"
 SCRIPT = Path(__file__).resolve().parent / "script.py"
-NO_BPY = 3  # the script's exit code
+NO_BPY = 3  # the script's exit code; the script says it too, as Blender's Python has none of our modules
 REMEDY = "run `make bench-blender`, which makes an environment with one"
 
 
