@@ -27,10 +27,11 @@ demo: $(SETUP)  ## 40 rendered frames, poses and out/demo/report.html
 test: $(SETUP)  ## the tests that need pip only, under 6 minutes on 2 cores
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not full and not slow"
 
-test-full: $(SETUP)  ## adds other environments: the built wheel alone
+test-full: $(SETUP)  ## adds a Ray cluster, and other environments: the built wheel alone
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check "ray>=2.9"
 	$(BIN)/python -m pytest -m full
 
-check-slow: $(SETUP)  ## thirty kills at random moments
+check-slow: $(SETUP)  ## kills at random moments, two commands at once
 	$(BIN)/python -m pytest -m slow
 
 test-oldest:  ## the library alone, with the oldest NumPy and SciPy that it allows

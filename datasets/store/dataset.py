@@ -38,10 +38,14 @@ class Dataset:
         """Path of a shard; `variant` tells kinds of estimates apart."""
         return self.root / table / f"{variant or table}-{index:05d}-of-{count:05d}.parquet"
 
+    def index_of(self, path: Path) -> int:
+        """The number of a shard."""
+        return int(path.stem.rsplit("-", 3)[1])
+
     def sibling(self, path: Path, table: str) -> Path:
         """The shard of another table over the same frames."""
-        _, index, _, count = path.stem.rsplit("-", 3)
-        return self.shard_path(table, int(index), int(count))
+        count = int(path.stem.rsplit("-", 1)[1])
+        return self.shard_path(table, self.index_of(path), count)
 
     def is_done(self, path: Path) -> bool:
         """Whether a valid shard of this recipe is there."""

@@ -44,6 +44,10 @@ PATIENCE_S = 1.0  # how long one tries that meets another who has just begun
 PAUSE_S = 0.05  # mean time between two tries; an announcement takes less than a millisecond
 
 
+class HeldError(UserError):
+    """Another process writes the dataset."""
+
+
 @dataclass(frozen=True, slots=True)
 class Holder:
     """Who holds a dataset."""
@@ -62,7 +66,8 @@ def hold(root: Path, *, shared: bool = False) -> Iterator[None]:
     shared: others that hold it shared may stand beside; alone: nobody.
 
     Raises:
-        UserError: another holds it (who, since when and what to do), or the folder cannot be written.
+        HeldError: another holds it: who, since when and what to do.
+        UserError: the folder cannot be written.
     """
     try:
         path, descriptor = _take(root, shared)
@@ -137,12 +142,12 @@ def _has_settled(path: Path) -> bool:
         return False
 
 
-def _held(root: Path, path: Path, holder: Holder) -> UserError:
+def _held(root: Path, path: Path, holder: Holder) -> HeldError:
     who = f"`{holder.command}` (process {holder.pid} on {holder.host}, since {holder.since} UTC)"
     advice = "wait until it has ended"
     if state_of(path) is State.UNKNOWN:
         advice += f", or delete {path} if it no longer runs there"
-    return UserError(f"{root} is being written by {who}; {advice}, or choose another folder")
+    return HeldError(f"{root} is being written by {who}; {advice}, or choose another folder")
 
 
 def _command() -> str:

@@ -48,6 +48,8 @@ def _link_or_copy(source: Path, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
         os.link(source, path)
+    except FileExistsError:  # another process of this dataset was first
+        return
     except OSError as error:  # another disk, or a file system or a policy without links
         if error.errno not in (errno.EXDEV, errno.EPERM, errno.EACCES, errno.EMLINK, errno.ENOTSUP, errno.ENOSYS):
             raise

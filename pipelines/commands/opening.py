@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,10 +32,12 @@ def load(recipe: str, regime: str | None) -> tuple[Recipe, str]:
 
 
 @contextmanager
-def begin(recipe: str, out: Path, regime: str | None, reuse: Path | None, console: Console) -> Iterator[Dataset]:
+def begin(
+    recipe: str, out: Path, regime: str | None, reuse: Path | None, console: Console, *, shared: bool = False
+) -> Iterator[Dataset]:
     """The dataset of a recipe, begun or resumed in `out`, with linear light from `reuse` where it fits.
 
-    Nobody else writes it while the body runs.
+    Nobody else writes it while the body runs, but others that share it, with the same recipe.
 
     Raises:
         UserError: a recipe, folder or plan that is not usable, or another process writes the folder.
@@ -47,7 +50,7 @@ def begin(recipe: str, out: Path, regime: str | None, reuse: Path | None, consol
     plan(loaded)
     if reuse is not None:
         open_dataset(reuse)  # before anything is written
-    with claim(out, loaded, text) as dataset:
+    with claim(out, loaded, text, shared=shared) as dataset:
         if reuse is not None:
             from datasets.store.reuse import reuse_linear_images
 
@@ -57,8 +60,8 @@ def begin(recipe: str, out: Path, regime: str | None, reuse: Path | None, consol
 
 
 @contextmanager
-def writing(folder: Path) -> Iterator[Dataset]:
-    """The dataset in a folder; nobody else writes it while the body runs.
+def writing(folder: Path, *, shared: bool = False) -> Iterator[Dataset]:
+    """The dataset in a folder; nobody else writes it while the body runs, but others that share it.
 
     Raises:
         UserError: there is none, or another process writes it.
@@ -66,8 +69,25 @@ def writing(folder: Path) -> Iterator[Dataset]:
     from datasets.store.lock import hold
 
     dataset = opened(folder)
-    with hold(folder):
+    with hold(folder, shared=shared):
         yield dataset
+
+
+def complete_manifest(dataset: Dataset) -> None:
+    """List in the manifest what parts of a run have made; nothing while another process goes on making more.
+
+    Raises:
+        UserError: a shard is damaged, or the folder cannot be written.
+    """
+    from datasets.store.lock import HeldError, hold
+
+    with ExitStack() as stack:
+        try:
+            stack.enter_context(hold(dataset.root))
+        except HeldError as error:
+            print(f"the manifest stays as it is, as {error}", file=sys.stderr)
+            return
+        dataset.write_manifest()
 
 
 def opened(folder: Path) -> Dataset:

@@ -16,6 +16,17 @@ Folder = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a dataset
 RecipeName = Annotated[str, typer.Argument(metavar="RECIPE", help="A .toml file, or a name from `recipes`.")]
 ShownRecipe = Annotated[str | None, typer.Argument(metavar="[RECIPE]", help="Show its values beside the keys.")]
 Workers = Annotated[int, typer.Option(help="Processes; the result is the same for any number.")]
+EngineName = Annotated[
+    str, typer.Option("--engine", help="Where shards are worked on: local, or ray (to be installed).")
+]
+RayAddress = Annotated[
+    str | None,
+    typer.Option(metavar="HOST:PORT", help="Ray cluster that runs already, instead of a Ray of --workers processes."),
+]
+Shard = Annotated[
+    str | None,
+    typer.Option(metavar="I/N", help="Only part I of N, I from 1 to N, of the shards; all parts may run at once."),
+]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for machines, instead of text.")]
 Regime = Annotated[

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
 from rich.console import Console
 
 from datasets.errors import UserError
 from pipelines.commands import options as o
-from pipelines.commands.opening import begin, opened, writing
+from pipelines.commands.opening import begin, complete_manifest, opened, writing
+from pipelines.engines.choice import engine_of
+from pipelines.stages.part import part_of
+
+if TYPE_CHECKING:
+    from datasets.store.dataset import Dataset
 
 
 def run(
@@ -19,27 +25,41 @@ def run(
     reuse: o.Reuse = None,
     solver: o.MoreSolvers = None,
     workers: o.Workers = 1,
+    engine: o.EngineName = "local",
+    ray_address: o.RayAddress = None,
+    shard: o.Shard = None,
     quiet: o.Quiet = False,
 ) -> None:
     """Every stage: generate, detect, estimate, score, report."""
     from pipelines.stages import run as stages
     from pipelines.stages.settings import RUN_SETTINGS, settings_of
 
-    console = Console(quiet=quiet)
+    console, part, place = Console(quiet=quiet), part_of(shard), engine_of(engine, workers, ray_address)
     settings = [*RUN_SETTINGS, *settings_of(solver or [])]
-    with begin(recipe, out, regime, reuse, console) as dataset:
-        stages.run_generate(dataset, workers, console)
-        stages.run_detect(dataset, workers, console)
-        stages.run_estimate(dataset, settings, workers, console)
-        stages.run_score(dataset, workers, console)
-        report(out)
+    with begin(recipe, out, regime, reuse, console, shared=not part.is_whole) as dataset:
+        stages.run_generate(dataset, place, console, part)
+        stages.run_detect(dataset, place, console, part=part)
+        stages.run_estimate(dataset, settings, place, console, part)
+        stages.run_score(dataset, place, console, part)
+        if part.is_whole:
+            _report(dataset)
+        else:
+            told = (
+                f"part {part.number} of {part.count} is done; after the last one, `report {out}` completes the dataset"
+            )
+            console.print(told, soft_wrap=True)
 
 
 def demo(
-    out: o.Out = Path("out/demo"), regime: o.Regime = None, workers: o.Workers = 1, quiet: o.Quiet = False
+    out: o.Out = Path("out/demo"),
+    regime: o.Regime = None,
+    workers: o.Workers = 1,
+    engine: o.EngineName = "local",
+    ray_address: o.RayAddress = None,
+    quiet: o.Quiet = False,
 ) -> None:
     """Run the recipe `demo`: 40 images, five lenses, a report."""
-    run("demo", out, regime=regime, workers=workers, quiet=quiet)
+    run("demo", out, regime=regime, workers=workers, engine=engine, ray_address=ray_address, quiet=quiet)
 
 
 def generate(
@@ -48,24 +68,34 @@ def generate(
     regime: o.Regime = None,
     reuse: o.Reuse = None,
     workers: o.Workers = 1,
+    engine: o.EngineName = "local",
+    ray_address: o.RayAddress = None,
+    shard: o.Shard = None,
     quiet: o.Quiet = False,
 ) -> None:
     """Render images with their truth."""
     from pipelines.stages import run as stages
 
-    console = Console(quiet=quiet)
-    with begin(recipe, out, regime, reuse, console) as dataset:
-        stages.run_generate(dataset, workers, console)
+    console, part, place = Console(quiet=quiet), part_of(shard), engine_of(engine, workers, ray_address)
+    with begin(recipe, out, regime, reuse, console, shared=not part.is_whole) as dataset:
+        stages.run_generate(dataset, place, console, part)
 
 
 def detect(
-    folder: o.Folder, detector: o.DetectorName = "edge-fit", workers: o.Workers = 1, quiet: o.Quiet = False
+    folder: o.Folder,
+    detector: o.DetectorName = "edge-fit",
+    workers: o.Workers = 1,
+    engine: o.EngineName = "local",
+    ray_address: o.RayAddress = None,
+    shard: o.Shard = None,
+    quiet: o.Quiet = False,
 ) -> None:
     """Find corners and circle in the images; each detector's points stay beside the others'."""
     from pipelines.stages import run as stages
 
-    with writing(folder) as dataset:
-        stages.run_detect(dataset, workers, Console(quiet=quiet), detector)
+    part, place = part_of(shard), engine_of(engine, workers, ray_address)
+    with writing(folder, shared=not part.is_whole) as dataset:
+        stages.run_detect(dataset, place, Console(quiet=quiet), detector, part)
 
 
 def estimate(
@@ -80,6 +110,9 @@ def estimate(
     detector: o.DetectorName = "edge-fit",
     overwrite: o.Overwrite = False,
     workers: o.Workers = 1,
+    engine: o.EngineName = "local",
+    ray_address: o.RayAddress = None,
+    shard: o.Shard = None,
     quiet: o.Quiet = False,
 ) -> None:
     """Estimate poses with a solver, or with your own function; nothing is rendered again."""
@@ -87,15 +120,15 @@ def estimate(
     from pipelines.stages.settings import Setting, System
 
     setting = Setting("best" if solver is None else solver, points, camera, use, noise_px, draws, detector)
-    console = Console(quiet=quiet)
+    console, part, place = Console(quiet=quiet), part_of(shard), engine_of(engine, workers, ray_address)
     if estimator is None:
-        with writing(folder) as dataset:
-            stages.run_estimate(dataset, [setting], workers, console, overwrite=overwrite)
+        with writing(folder, shared=not part.is_whole) as dataset:
+            stages.run_estimate(dataset, [setting], place, console, part, overwrite=overwrite)
         return
     if solver is not None or setting != Setting(camera=camera):
         raise UserError("--estimator is given images: leave out --solver and the options that choose points")
-    with writing(folder) as dataset:
-        stages.run_system(dataset, System(estimator, camera), workers, console, overwrite=overwrite)
+    with writing(folder, shared=not part.is_whole) as dataset:
+        stages.run_system(dataset, System(estimator, camera), place, console, part, overwrite=overwrite)
 
 
 def score(
@@ -104,6 +137,9 @@ def score(
     name: o.PosesName = None,
     camera: o.CameraName = "exact",
     workers: o.Workers = 1,
+    engine: o.EngineName = "local",
+    ray_address: o.RayAddress = None,
+    shard: o.Shard = None,
     quiet: o.Quiet = False,
 ) -> None:
     """Score every estimate, and the poses of a file, against the truth."""
@@ -114,15 +150,23 @@ def score(
         raise UserError("--poses and --name go together; give a file of poses and what to call them, or neither")
     if poses is None and camera != "exact":
         raise UserError("--camera goes with --poses; leave it out, or give a file of poses")
-    console = Console(quiet=quiet)
-    with writing(folder) as dataset:
+    if poses is not None and shard is not None:
+        raise UserError("--poses takes a file as a whole; leave out --shard")
+    console, part, place = Console(quiet=quiet), part_of(shard), engine_of(engine, workers, ray_address)
+    with writing(folder, shared=not part.is_whole) as dataset:
         if poses is not None and name is not None:
             stages.run_import(dataset, poses, System(name, camera), console)
-        stages.run_score(dataset, workers, console)
+        stages.run_score(dataset, place, console, part)
 
 
 def report(folder: o.Folder) -> None:
-    """Write report.html."""
+    """Write report.html, and the manifest of what parts of a run have made."""
+    dataset = opened(folder)
+    _report(dataset)
+    complete_manifest(dataset)
+
+
+def _report(dataset: Dataset) -> None:
     from pipelines.report.page import write_report
 
-    typer.echo(f"report: {write_report(opened(folder))}")
+    typer.echo(f"report: {write_report(dataset)}")

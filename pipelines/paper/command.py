@@ -12,7 +12,8 @@ from threadpoolctl import threadpool_limits
 from datasets.errors import UserError
 from datasets.store.atomic import write_text
 from datasets.store.refusals import refused
-from pipelines.engines.local import check_workers
+from pipelines.engines.engine import Engine
+from pipelines.engines.local import LocalEngine
 from pipelines.machine import versions
 from pipelines.paper.claims import Claim, PaperSection
 from pipelines.report.template import rendered
@@ -24,7 +25,7 @@ Measure = Callable[[], Sequence[PaperSection]]
 MAX_SEEDS = 1000
 
 
-def parts(out: Path, seeds: int, workers: int, tell: Callable[[str], None]) -> dict[str, Measure]:
+def parts(out: Path, seeds: int, engine: Engine, tell: Callable[[str], None]) -> dict[str, Measure]:
     """The parts by name, in the order of the page."""
     from pipelines.paper.beyond import beyond
     from pipelines.paper.experiment import measure as experiment
@@ -42,8 +43,8 @@ def parts(out: Path, seeds: int, workers: int, tell: Callable[[str], None]) -> d
         "fisheye": lambda: [fisheye(seeds)],
         "sensitivity": lambda: [sensitivity(max(1, seeds // 4))],
         "beyond": beyond,
-        "images": lambda: [images(out / "images", workers, tell)],
-        "wide": lambda: [wide(out / "wide", workers, tell)],
+        "images": lambda: [images(out / "images", engine, tell)],
+        "wide": lambda: [wide(out / "wide", engine, tell)],
         "experiment": lambda: [experiment(out / "experiment", tell)],
     }
 
@@ -58,11 +59,11 @@ def reproduce(out: Path, only: Sequence[str], seeds: int, points_only: bool, wor
     """
     if not 1 <= seeds <= MAX_SEEDS:
         raise UserError(f"{seeds} draws of noise are not usable; give --seeds from 1 to {MAX_SEEDS}")
-    check_workers(workers)
+    engine = LocalEngine(workers)
     console, sections, claims = Console(), list[PaperSection](), list[Claim]()
     # The batches are of small matrices, which threads only slow down.
     with Progress(console=console) as progress, threadpool_limits(1):
-        known = parts(out, seeds, workers, lambda text: progress.update(bar, description=text))
+        known = parts(out, seeds, engine, lambda text: progress.update(bar, description=text))
         for name in only:
             if name not in known:
                 raise UserError(f"unknown part {name!r}; choose one of {', '.join(known)}")

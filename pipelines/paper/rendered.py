@@ -15,6 +15,7 @@ from datasets.store.dataset import Dataset
 from datasets.store.lock import hold
 from eposit import Status
 from eposit.arrays import Array
+from pipelines.engines.engine import Engine
 from pipelines.paper.beyond.field_images import field_of_images
 from pipelines.paper.claims import PaperSection
 from pipelines.paper.simulation import COMPONENTS, LENSES, UNITS
@@ -41,17 +42,17 @@ HEAD = (
 )
 
 
-def images(folder: Path, workers: int, tell: Callable[[str], None]) -> PaperSection:
+def images(folder: Path, engine: Engine, tell: Callable[[str], None]) -> PaperSection:
     """Mean errors and medians of |error| on rendered pictures.
 
     Raises:
         UserError: the folder holds something else, or the disk refuses.
     """
-    dataset, console = pictures(RECIPE, folder, workers, tell), Console(quiet=True)
+    dataset, console = pictures(RECIPE, folder, engine, tell), Console(quiet=True)
     tell("images: estimates")
     with hold(dataset.root):
-        run_estimate(dataset, SETTINGS, workers, console)
-        run_score(dataset, workers, console)
+        run_estimate(dataset, SETTINGS, engine, console)
+        run_score(dataset, engine, console)
     scores, cameras = dataset.read("scores"), dataset.read("frames", ["frame_id", "camera_name"])
     tables = tuple(
         _table(scores, cameras, title, take) for title, take in (("Mean errors", _mean), ("Medians", _median))
@@ -65,26 +66,26 @@ def images(folder: Path, workers: int, tell: Callable[[str], None]) -> PaperSect
     return PaperSection("On rendered pictures", intro, tables)
 
 
-def wide(folder: Path, workers: int, tell: Callable[[str], None]) -> PaperSection:
+def wide(folder: Path, engine: Engine, tell: Callable[[str], None]) -> PaperSection:
     """Success against field angle on the pictures of the recipe `wide`.
 
     Raises:
         UserError: the folder holds something else, or the disk refuses.
     """
-    pictures("wide", folder, workers, tell)
+    pictures("wide", folder, engine, tell)
     tell("wide: poses")
     return field_of_images(folder)
 
 
-def pictures(name: str, folder: Path, workers: int, tell: Callable[[str], None]) -> Dataset:
+def pictures(name: str, folder: Path, engine: Engine, tell: Callable[[str], None]) -> Dataset:
     """The dataset of a recipe that comes along, rendered and detected; what is there is kept."""
     recipe, text = load_recipe(name)
     console = Console(quiet=True)
     with claim(folder, recipe, text) as dataset:
         tell(f"{name}: rendering")
-        run_generate(dataset, workers, console)
+        run_generate(dataset, engine, console)
         tell(f"{name}: detection")
-        run_detect(dataset, workers, console)
+        run_detect(dataset, engine, console)
     return dataset
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from pathlib import Path
 
 import numpy as np
@@ -28,9 +29,9 @@ def is_gross_failure(failed: Mask, found_t: Array, true_t: Array) -> Mask:
     return failed | far
 
 
-def targets(dataset: Dataset) -> list[Path]:
-    """Estimate shards, each of which gets a shard of scores."""
-    return dataset.shards("estimates")
+def targets(dataset: Dataset, indices: Container[int]) -> list[Path]:
+    """Estimate shards of some numbers, each of which gets a shard of scores."""
+    return [path for path in dataset.shards("estimates") if dataset.index_of(path) in indices]
 
 
 def is_done(dataset: Dataset, estimates: Path) -> bool:

@@ -16,6 +16,7 @@ from datasets.store.dataset import Dataset
 from eposit import Pose, Status
 from eposit.arrays import Array
 from pipelines.detection import Detector
+from pipelines.engines.local import LocalEngine
 from pipelines.paper.claims import PaperSection, judged
 from pipelines.paper.experiment import figures
 from pipelines.paper.experiment.calibration import AT_ONCE
@@ -68,9 +69,9 @@ def dataset_in(folder: Path, tell: Callable[[str], None]) -> Dataset:
     tell(f"experiment: {len(plan(recipe))} pictures in {folder}")
     quiet = Console(quiet=True)
     with claim(folder, recipe, text) as dataset:
-        stages.run_generate(dataset, 1, quiet)
+        stages.run_generate(dataset, LocalEngine(), quiet)
         for detector in DETECTORS:
-            stages.run_detect(dataset, 1, quiet, detector)
+            stages.run_detect(dataset, LocalEngine(), quiet, detector)
     return dataset
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import multiprocessing
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -263,35 +262,3 @@ def test_a_stage_beside_a_writer_is_refused_and_readers_are_not(root, cli):
             assert_one_sentence(outcome.code, outcome.err, f"{root} is being written by")
         assert cli("verify", root).code == 0
         assert cli("report", root).code == 0
-
-
-def started(*words):
-    return subprocess.Popen(
-        [sys.executable, "-m", "pipelines", *map(str, words)],
-        cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("number", range(20))
-def test_two_runs_at_once_on_one_folder(number, tiny, tmp_path, content):
-    """The same recipe, another one, and `estimate` beside `run`: each finishes or is refused, and nothing is lost."""
-    recipe, other, root = tmp_path / "a.toml", tmp_path / "b.toml", tmp_path / "dataset"
-    recipe.write_text(tiny[0])
-    other.write_text(tiny[0].replace("seed = 5", "seed = 6"))
-    second = (recipe, other, None)[number % 3]
-    if second is None:
-        shutil.copytree(tiny[1], root)
-        shutil.rmtree(root / "scores")
-    words = ("estimate", root) if second is None else ("run", second, "--out", root, "-q")
-    both = [started("run", recipe, "--out", root, "-q"), started(*words)]
-    ends = [(process.communicate(timeout=120)[1], process.returncode) for process in both]
-    assert 0 in {code for _, code in ends}
-    for err, code in ends:
-        if code:
-            assert_one_sentence(code, err, str(root))
-    seed = "seed = 6" if "seed = 6" in (root / "recipe.toml").read_text() else "seed = 5"
-    assert started("run", other if seed == "seed = 6" else recipe, "--out", root, "-q").wait(120) == 0
-    if seed == "seed = 5":
-        assert content(root) == content(tiny[1])
-    assert list(root.rglob(".*")) == []

@@ -6,7 +6,7 @@ import signal
 import pytest
 
 from datasets.errors import UserError
-from pipelines.engines.local import map_shards
+from pipelines.engines.local import LocalEngine
 
 
 def double(task):
@@ -25,21 +25,21 @@ def dies_at_two(task):
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_every_task_is_done_once(workers):
-    assert sorted(map_shards(double, range(5), workers)) == [(0, 0), (1, 2), (2, 4), (3, 6), (4, 8)]
+    assert sorted(LocalEngine(workers).map(double, range(5))) == [(0, 0), (1, 2), (2, 4), (3, 6), (4, 8)]
 
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_an_error_in_a_task_reaches_the_caller(workers):
     with pytest.raises(UserError, match="two is wrong"):
-        list(map_shards(fails_at_two, range(5), workers))
+        list(LocalEngine(workers).map(fails_at_two, range(5)))
 
 
 def test_a_killed_worker_is_a_sentence():
     with pytest.raises(UserError, match="killed"):
-        list(map_shards(dies_at_two, range(5), 2))
+        list(LocalEngine(2).map(dies_at_two, range(5)))
 
 
 @pytest.mark.parametrize("workers", [0, -1, 100000])
 def test_workers_out_of_range(workers):
     with pytest.raises(UserError, match="--workers from 1"):
-        list(map_shards(double, range(5), workers))
+        LocalEngine(workers)
