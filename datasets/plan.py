@@ -18,7 +18,7 @@ from datasets.trajectories.listed import Listed
 from datasets.trajectories.scatter import MAX_TRIES, Scatter
 from datasets.trajectories.view import PosedFrame, hand_held
 from eposit import Pose
-from render.sensor.motion import Rate
+from render.sensor.motion import PoseRate
 from render.sensor.presets import SensorModel
 
 
@@ -41,7 +41,7 @@ class Frame:
     time_s: float
     camera: CameraSpec
     cam_from_obj: Pose
-    rate: Rate  # of the pose
+    rate: PoseRate  # of the pose
     sensor: SensorModel
     render_seed: int  # 32 bits
     sensor_seed: int  # 63 bits

@@ -15,9 +15,11 @@ from datasets.schema import ESTIMATES
 from datasets.store.images import decode_png
 from eposit import Camera, Pose, Solution
 from eposit.arrays import Array
-from render.targets.chessboard import Target
+from render.targets import Target
 
 LEAST_SIDE_PX = 16
+QUATERNION_COLUMNS = tuple(f"q_{axis}" for axis in "wxyz")
+POSITION_COLUMNS = tuple(f"t_{axis}_mm" for axis in "xyz")
 
 
 def table(schema: pa.Schema, columns: dict[str, Any]) -> pa.Table:
@@ -33,8 +35,8 @@ def pose_columns(R: Array, t: Array) -> dict[str, Array]:
     quaternion = np.full((len(t), 4), np.nan)
     if np.any(finite):
         quaternion[finite] = Pose(R[finite], t[finite]).quaternion
-    columns = {f"q_{axis}": quaternion[:, i] for i, axis in enumerate("wxyz")}
-    return columns | {f"t_{axis}_mm": t[:, i] for i, axis in enumerate("xyz")}
+    columns = dict(zip(QUATERNION_COLUMNS, quaternion.T, strict=True))
+    return columns | dict(zip(POSITION_COLUMNS, t.T, strict=True))
 
 
 def estimate_rows(

@@ -64,9 +64,7 @@ def _render() -> Check:
     recipe, _ = load_recipe("smoke")
     frame = plan(recipe)[0]
     try:
-        linear = render_frame(
-            recipe.target, recipe.light, frame.camera.true_camera(), frame.cam_from_obj, samples=4, seed=0
-        )
+        linear = render_frame(recipe.target, recipe.light, frame.camera.true_camera(), frame.cam_from_obj, samples=4)
     except backend.BackendError as error:
         return Check("rendering", False, str(error))
-    return Check("rendering", True, f"a region of {linear.region[2]} x {linear.region[3]} px came out")
+    return Check("rendering", True, f"a region of {linear.region.width} x {linear.region.height} px came out")

@@ -82,7 +82,7 @@ def cuda_present() -> bool:
 
 
 @functools.cache
-def load() -> Any:
+def load() -> Any:  # Any: the attributes of the module are those of the variant that it is set to
     """Mitsuba with its variant fixed for this process.
 
     `EPOSIT_VARIANT` chooses between llvm_ad_mono and cuda_ad_mono; without it a CUDA GPU is used where there is one.
@@ -108,7 +108,7 @@ def load() -> Any:
     return mi
 
 
-def jit() -> Any:
+def jit() -> Any:  # Any: its stubs give `object` for much that our arrays pass through
     """Dr.Jit, for code that works on its arrays; `load` comes first."""
     import drjit
 

@@ -12,7 +12,8 @@ from typing import Annotated
 import numpy as np
 
 from eposit.arrays import Array
-from render.targets.chessboard import Target
+from render.targets import Target
+from render.targets.chessboard import Chessboard
 from render.targets.disc_shade import blocked_share
 
 GRID_SHARE = 0.01  # spacing of the map of the light in squares: 1 mm on the paper's board, a third of the penumbra
@@ -61,7 +62,7 @@ class Light:
         return np.array([centre + half * (a * side + b * up) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
 
 
-def shading_map(target: Target, light: Light) -> tuple[Array, float]:
+def shading_map(target: Chessboard, light: Light) -> tuple[Array, float]:
     """Radiance over reflectance, and the same on the circle.
 
     Returns:
@@ -87,20 +88,20 @@ def shading_map(target: Target, light: Light) -> tuple[Array, float]:
     return lamp_scale * lamp + ambient_scale * ambient, lamp_scale * disc + ambient_scale * (1.0 - disc / np.pi)
 
 
-def shadow_radius(target: Target, light: Light) -> float:
+def shadow_radius(target: Chessboard, light: Light) -> float:
     """Distance from the circle's axis, mm, within which the lamp's shadow of it lies on the board."""
     to_lamp = light.lamp_corners(target) - target.circle_centre
     slope = np.max(np.linalg.norm(to_lamp[:, :2] / to_lamp[:, 2:], axis=1))
     return float(target.circle_radius_mm + 1.1 * target.circle_height_mm * slope + 2.0 * GRID_SHARE * target.square_mm)
 
 
-def reference_irradiance(target: Target, light: Light) -> tuple[float, float]:
+def reference_irradiance(target: Chessboard, light: Light) -> tuple[float, float]:
     """Irradiance of a lamp of unit radiance, and the share of the surrounding it leaves, at the board's centre."""
     lamp = float(lamp_irradiance(target, light, target.board_centre[None], SMOOTH_SAMPLES, shadowed=False)[0])
     return lamp, 1.0 - lamp / np.pi
 
 
-def _smooth_lamp(target: Target, light: Light, points: Array) -> Array:
+def _smooth_lamp(target: Chessboard, light: Light, points: Array) -> Array:
     """Unshadowed lamp on a coarse grid, interpolated: it varies over metres."""
     step = 10
     rows, columns = points.shape[:2]
@@ -114,21 +115,18 @@ def _smooth_lamp(target: Target, light: Light, points: Array) -> Array:
     return np.stack([np.interp(np.arange(rows), iy, column) for column in across.T], axis=1)
 
 
-def lamp_irradiance(target: Target, light: Light, points: Array, samples: int, *, shadowed: bool) -> Array:
+def lamp_irradiance(target: Chessboard, light: Light, points: Array, samples: int, *, shadowed: bool) -> Array:
     """Irradiance of a lamp of unit radiance at (n, 3) points that face -z, by quadrature over the lamp's area.
 
-    samples: along each side. Gauss-Legendre where nothing casts a shadow, so that six are exact to nine digits; the
-    midpoint rule where the circle's shadow jumps within the lamp.
+    samples: along each side of the lamp. Gauss-Legendre where nothing casts a shadow, so that six are exact to nine
+    digits; the midpoint rule where the circle's shadow jumps within the lamp.
     """
     corners = light.lamp_corners(target)
     edge_a, edge_b = corners[1] - corners[0], corners[3] - corners[0]
     normal = np.cross(edge_a, edge_b)
     area = float(np.linalg.norm(normal))
     normal = normal / area
-    shares, weights = ((np.arange(samples) + 0.5) / samples, np.full(samples, 1.0 / samples))
-    if not shadowed:
-        nodes, weights = np.polynomial.legendre.leggauss(samples)
-        shares, weights = 0.5 + 0.5 * nodes, 0.5 * weights
+    shares, weights = _midpoint_rule(samples) if shadowed else _gauss_legendre_rule(samples)
     px, py, pz = np.ascontiguousarray(points.T)
     cx, cy, cz = target.circle_centre
     reach = pz - cz  # along -z from the point to the circle's plane
@@ -145,3 +143,14 @@ def lamp_irradiance(target: Target, light: Light, points: Array, samples: int, *
             value[across * across + down * down < target.circle_radius_mm**2] = 0.0
         total += value
     return total
+
+
+def _midpoint_rule(samples: int) -> tuple[Array, Array]:
+    """(samples,) nodes and weights on [0, 1]."""
+    return (np.arange(samples) + 0.5) / samples, np.full(samples, 1.0 / samples)
+
+
+def _gauss_legendre_rule(samples: int) -> tuple[Array, Array]:
+    """(samples,) nodes and weights on [0, 1]."""
+    nodes, weights = np.polynomial.legendre.leggauss(samples)
+    return 0.5 + 0.5 * nodes, 0.5 * weights

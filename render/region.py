@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eposit import Camera, Pose
-from render.targets.chessboard import Target
+from render.targets import Target
+from render.targets.image_region import Region
 
 Image = NDArray[np.float32]  # (height, width) linear radiance
-Region = tuple[int, int, int, int]  # x, y, width, height, px
 REGION_MARGIN = 8  # px around the target's outline; a point spread of 1.5 px needs 6
 
 
@@ -21,10 +21,10 @@ def target_region(target: Target, camera: Camera, cam_from_obj: Pose, margin: in
     """
     outline = camera.project(cam_from_obj.apply(target.outline()))
     if np.any(np.isnan(outline)):
-        return 0, 0, camera.width, camera.height  # part of the board is beyond the lens: it may reach anywhere
+        return Region.whole(camera.width, camera.height)  # part of the board is beyond the lens: it may reach anywhere
     low = np.floor(outline.min(axis=0)).astype(int) - margin
     high = np.ceil(outline.max(axis=0)).astype(int) + margin + 1
     low, high = np.maximum(low, 0), np.minimum(high, (camera.width, camera.height))
     if np.any(high <= low):
         raise ValueError("the target's image lies outside the picture; move the target or the camera")
-    return int(low[0]), int(low[1]), int(high[0] - low[0]), int(high[1] - low[1])
+    return Region.between((int(low[0]), int(low[1])), (int(high[0]), int(high[1])))

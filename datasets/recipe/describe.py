@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 from collections.abc import Iterator
 from dataclasses import MISSING, asdict, fields, is_dataclass
@@ -10,11 +9,16 @@ from typing import Any, get_args, get_type_hints
 
 from pydantic import BaseModel, ValidationError
 
+from datasets.errors import did_you_mean
+from datasets.recipe.camera_sets import FROM, camera_references, reference_of
+from datasets.recipe.cameras import CameraSpec
 from datasets.trajectories import TRAJECTORIES
 from render.sensor.presets import DEFAULT_REGIME, SensorModel, regime_of, regimes
 
 Key = tuple[str, str, str]  # key, default, meaning
 REGIME = "sensor.regime"
+CAMERAS_FROM = f"cameras.{FROM}"
+OWN_VALUES = "own values"  # shown where values have no name
 UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")  # Pydantic's types of fault
 
 
@@ -28,6 +32,9 @@ def keys_of(model: type[BaseModel]) -> Iterator[Key]:
         if SensorModel in sections:
             choice = ", ".join(regimes())
             yield REGIME, toml_value(DEFAULT_REGIME), f"{choice}: the values of the keys below that are left out"
+        if CameraSpec in sections:
+            choice = ", ".join(camera_references())
+            yield CAMERAS_FROM, toml_value(None), f"whose values the keys below have that are left out: {choice}"
         yield from ((f"{name}.{key}", default, meaning) for key, default, meaning in _merged(sections))
 
 
@@ -75,7 +82,9 @@ def values_of(recipe: BaseModel) -> dict[str, str]:
         head, _, tail = key.partition(".")
         value = getattr(recipe, head)
         if key == REGIME:
-            found[key] = toml_value(regime_of(value) or "own values")
+            found[key] = toml_value(regime_of(value) or OWN_VALUES)
+        elif key == CAMERAS_FROM:
+            found[key] = ", ".join(toml_value(reference_of(camera) or OWN_VALUES) for camera in value)
         elif head == "cameras":
             shown = [toml_value(getattr(camera, tail)) for camera in value] if tail else [f"{len(value)} cameras"]
             found[key] = ", ".join(shown)
@@ -111,10 +120,8 @@ def sentence(error: ValidationError, model: type[BaseModel]) -> str:
     key, fault, given = ".".join(path) or "recipe", first["type"], first.get("input")
     if fault in UNKNOWN_KEY:
         known = field_names(kind) if kind and len(path) == 2 else _keys_beside(path, model)
-        close = difflib.get_close_matches(path[-1], known, n=1)
-        hint = f" (did you mean {close[0]!r}?)" if close else ""
         where = f"known keys of kind {_kind(kind)!r} are" if kind and len(path) == 2 else "known keys there are"
-        return f"unknown key {key!r}{hint}; {where} {', '.join(known)}"
+        return f"unknown key {key!r}{did_you_mean(path[-1], known)}; {where} {', '.join(known)}"
     if fault in ("missing", "missing_argument", "missing_keyword_only_argument"):
         return f"key {key!r} is missing; add it"
     if fault == "value_error":

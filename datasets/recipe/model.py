@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import hashlib
 import json
 import tomllib
@@ -14,19 +13,20 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-from datasets.errors import UserError
+from datasets.errors import UserError, did_you_mean
+from datasets.recipe.camera_sets import SUFFIX, resolved
 from datasets.recipe.cameras import CameraSpec
 from datasets.recipe.cameras import assumed_camera as assumed_camera
 from datasets.recipe.describe import Key, keys_of, sentence, values_of
 from datasets.recipe.quality import QUALITIES, QualityName, quality_text
+from datasets.recipe.written_out import written_out
 from datasets.trajectories import TRAJECTORIES, Trajectory
 from datasets.trajectories.helix import Helix
 from render.light import Light
 from render.sensor.presets import DEFAULT_REGIME, SensorModel, regimes
-from render.targets.chessboard import CIRCLE, Target
+from render.targets.chessboard import CIRCLE, Chessboard
 
 RECIPES = resources.files("datasets") / "recipes"
-SUFFIX = ".toml"
 
 
 class Recipe(BaseModel):
@@ -53,11 +53,14 @@ class Recipe(BaseModel):
             "the outermost corners of the first row and column and the circle if left out"
         ),
     ] = None
-    target: Annotated[Target, Field(description="the board and its circle")] = Target()
+    target: Annotated[Chessboard, Field(description="the board and its circle")] = Chessboard()
     light: Annotated[Light, Field(description="lamp, surrounding, background")] = Light()
     sensor: Annotated[SensorModel, Field(description="linear light to 8 bits")] = SensorModel()
     trajectory: Annotated[Trajectory, Field(discriminator="kind", description="the target's path")] = Helix()
-    cameras: Annotated[tuple[CameraSpec, ...], Field(min_length=1, description="the cameras; each sees every pose")]
+    cameras: Annotated[
+        tuple[CameraSpec, ...],
+        Field(min_length=1, description='the cameras, or the name of a set such as "paper"; each sees every pose'),
+    ]
 
     @field_validator("samples")
     @classmethod
@@ -83,7 +86,7 @@ class Recipe(BaseModel):
         return QUALITIES[self.quality].samples if self.samples is None else self.samples
 
     def four_indices(self) -> list[int]:
-        """Rows in `Target.points` of the four points, M0 first."""
+        """Rows in `Chessboard.points` of the four points, M0 first."""
         across, down = self.target.inner
         four = ((0, 0), (across - 1, 0), (0, down - 1), CIRCLE) if self.four is None else self.four
         return [self.target.index(point) for point in four]
@@ -119,7 +122,7 @@ def parse_recipe(text: str, source: str) -> Recipe:
 
 
 def _completed(data: dict[str, Any], source: str) -> dict[str, Any]:
-    """A recipe's data with the trajectory's kind and the values of the sensor's regime."""
+    """A recipe's data with the trajectory's kind and the values of the sensor's regime and of cameras that it names."""
     path, sensor = data.get("trajectory"), data.get("sensor")
     if isinstance(path, dict):
         kind = path.setdefault("kind", "helix")
@@ -130,11 +133,15 @@ def _completed(data: dict[str, Any], source: str) -> dict[str, Any]:
         if regime not in list(regimes()):
             raise UserError(f"{source}: sensor regime is {regime!r}; choose one of {', '.join(regimes())}")
         data["sensor"] = asdict(regimes()[regime]) | sensor
+    if "cameras" in data:
+        data["cameras"] = resolved(data["cameras"], source)
     return data
 
 
 def load_recipe(name: str) -> tuple[Recipe, str]:
     """A recipe and its text, by path or by the name of one that comes with the package.
+
+    The text has values instead of the names of camera sets, so that a dataset which keeps it needs nothing else.
 
     Raises:
         UserError: no such file or name, or a wrong recipe.
@@ -145,13 +152,12 @@ def load_recipe(name: str) -> tuple[Recipe, str]:
         except (OSError, UnicodeDecodeError) as error:
             reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
             raise UserError(f"cannot read recipe {name}: {reason}; give a .toml file, or one of {_known()}") from None
-        return parse_recipe(text, name), text
+        return parse_recipe(text, name), written_out(text, name)
     if name not in recipe_names():
-        close = difflib.get_close_matches(name, recipe_names(), n=1)
-        hint = f"did you mean {close[0]}? " if close else ""
-        raise UserError(f"unknown recipe {name!r}; {hint}known ones are {_known()}, or give a path to a .toml file")
+        hint = did_you_mean(name, recipe_names())
+        raise UserError(f"unknown recipe {name!r}{hint}; known ones are {_known()}, or give a path to a .toml file")
     text = (RECIPES / f"{name}{SUFFIX}").read_text(encoding="utf-8")
-    return parse_recipe(text, f"recipe {name}"), text
+    return parse_recipe(text, f"recipe {name}"), written_out(text, f"recipe {name}")
 
 
 def recipe_names() -> list[str]:

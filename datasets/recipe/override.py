@@ -1,49 +1,65 @@
-"""A recipe's text with another sensor regime, as if it had been written in the file."""
+"""A recipe's text with other values, as if they had been written in the file."""
 
 from __future__ import annotations
 
 import json
-import re
 import tomllib
+from collections.abc import Mapping, MutableMapping
 from typing import Any
 
-from datasets.errors import UserError
+import tomlkit
+from tomlkit import TOMLDocument
 
-SECTION = re.compile(r"^[ \t]*\[[ \t]*sensor[ \t]*\][^\n]*\n?", re.MULTILINE)
-NEXT_SECTION = re.compile(r"^[ \t]*\[", re.MULTILINE)
-REGIME_LINE = re.compile(r"^[ \t]*regime[ \t]*=[^\n]*$", re.MULTILINE)
+from datasets.errors import UserError
+from datasets.recipe.toml_text import changed_text
 
 
 def with_regime(text: str, regime: str, source: str) -> str:
-    """The TOML text with `sensor.regime` set; everything else stays as it is, other keys of the sensor too.
+    """The TOML text with `sensor.regime` set; everything else stays as it is, comments too.
+
+    text: a recipe that can be read. source: names it in messages.
 
     Raises:
-        UserError: the text is written so that no line can be put into it.
+        UserError: the text is written so that the regime cannot be put into it.
     """
-    line = f"regime = {json.dumps(regime)}"
-    header = SECTION.search(text)
-    if header is None:
-        changed = f"{text.rstrip()}\n\n[sensor]\n{line}\n"
-    else:
-        start = header.end()
-        following = NEXT_SECTION.search(text, start)
-        end = following.start() if following else len(text)
-        body = text[start:end]
-        body = REGIME_LINE.sub(line, body, count=1) if REGIME_LINE.search(body) else f"{line}\n{body}"
-        changed = text[:start].rstrip("\n") + "\n" + body + text[end:]
-    if _data(changed) != _wanted(text, regime):
+    data = tomllib.loads(text)
+    wanted = data | {"sensor": data.get("sensor", {}) | {"regime": regime}}
+    changed = changed_text(text, lambda document: _put_regime(document, regime), wanted)
+    if changed is None:
         raise UserError(f"cannot put --regime into {source}; write regime = {json.dumps(regime)} under [sensor] there")
     return changed
 
 
-def _wanted(text: str, regime: str) -> dict[str, Any] | None:
-    data = _data(text)
-    sensor = {} if data is None else data.get("sensor", {})
-    return None if data is None or not isinstance(sensor, dict) else data | {"sensor": sensor | {"regime": regime}}
+def with_values(text: str, values: Mapping[tuple[str, ...], int], source: str) -> str:
+    """The TOML text with other values of some keys, each given as its path; comments stay.
+
+    Raises:
+        UserError: the text is written so that a value cannot be put into it.
+    """
+    wanted = tomllib.loads(text)
+    for path, value in values.items():
+        _table(wanted, path)[path[-1]] = value
+    changed = changed_text(text, lambda document: _put_values(document, values), wanted)
+    if changed is None:
+        raise UserError(f"cannot put {', '.join('.'.join(path) for path in values)} into {source}; write them there")
+    return changed
 
 
-def _data(text: str) -> dict[str, Any] | None:
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError:
-        return None
+def _put_values(document: TOMLDocument, values: Mapping[tuple[str, ...], int]) -> str:
+    for path, value in values.items():
+        _table(document, path)[path[-1]] = value
+    return document.as_string()
+
+
+def _table(document: MutableMapping[str, Any], path: tuple[str, ...]) -> MutableMapping[str, Any]:
+    for name in path[:-1]:
+        document = document.setdefault(name, {})
+    return document
+
+
+def _put_regime(document: TOMLDocument, regime: str) -> str:
+    sensor = document.get("sensor")
+    if isinstance(sensor, MutableMapping):
+        sensor["regime"] = regime
+        return document.as_string()
+    return f"{document.as_string().rstrip()}\n\n{tomlkit.dumps({'sensor': {'regime': regime}})}"

@@ -18,6 +18,7 @@ from datasets.recipe.model import Recipe
 from datasets.store.atomic import replace_atomically
 from eposit import Camera
 from render.frame import LinearImage
+from render.targets.image_region import Region
 
 MASTERS = "masters"  # their folder
 
@@ -67,7 +68,7 @@ def read_linear(path: Path, key: str = "") -> LinearImage:
                     f"{path} belongs to another frame or recipe; delete it and run the generate stage again"
                 )
             (low, high), radiance = header["dataWindow"], channels["Y"].pixels
-            region = (int(low[0]), int(low[1]), int(high[0] - low[0] + 1), int(high[1] - low[1] + 1))
+            region = Region.between((int(low[0]), int(low[1])), (int(high[0]) + 1, int(high[1]) + 1))
             return LinearImage(np.array(radiance, np.float32), region, float(header["background"]))
     except LinearImageError:
         raise

@@ -7,10 +7,10 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from datasets.trajectories.view import MAX_POSES, SPEED_MEANING, TURN_MEANING, check_hand
+from datasets.trajectories.view import KIND_MEANING, MAX_POSES, SPEED_MEANING, TURN_MEANING, check_hand
 from eposit import Pose
 from eposit.pose import rotation_from_vector
-from render.targets.chessboard import Target
+from render.targets import Target
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,7 +24,7 @@ class FieldAngles:
         ValueError: an empty list, or a value out of range.
     """
 
-    kind: Annotated[Literal["field"], "helix, field, scatter or listed"] = "field"
+    kind: Annotated[Literal["field"], KIND_MEANING] = "field"
     field_deg: Annotated[tuple[float, ...], "angles of the board's centre from the optical axis, degrees"] = (0.0,)
     distance_mm: Annotated[tuple[float, ...], "distances of the board's centre from the camera centre, mm"] = (1500.0,)
     azimuth_deg: Annotated[
@@ -36,12 +36,21 @@ class FieldAngles:
     turn_deg_per_s: Annotated[float, TURN_MEANING] = 10.0
 
     def __post_init__(self) -> None:
+        self._check_counts()
+        self._check_values()
+        check_hand(self.speed_mm_per_s, self.turn_deg_per_s)
+
+    def _check_counts(self) -> None:
         counted = isinstance(self.azimuth_deg, int)
         if isinstance(self.azimuth_deg, int) and self.azimuth_deg < 1:
             raise ValueError(f"trajectory azimuth_deg is {self.azimuth_deg}; give a list of angles or a count above 0")
         for name in ("field_deg", "distance_mm", *(() if counted else ("azimuth_deg",))):
             if not getattr(self, name):
                 raise ValueError(f"trajectory {name} is an empty list; give at least one")
+        if len(self.field_deg) * len(self.distance_mm) * len(self.azimuths) > MAX_POSES:
+            raise ValueError("trajectory has more than a million poses; give fewer angles or distances")
+
+    def _check_values(self) -> None:
         for angle in self.field_deg:
             if not 0.0 <= angle < 180.0:
                 raise ValueError(f"trajectory field_deg holds {angle:g}; field angles lie in 0 to below 180 degrees")
@@ -50,9 +59,6 @@ class FieldAngles:
                 raise ValueError(f"trajectory distance_mm holds {distance:g}; distances are above 0 mm")
         if not 0.0 <= self.extra_tilt_deg <= 85.0:
             raise ValueError(f"trajectory extra_tilt_deg is {self.extra_tilt_deg}; it must lie in 0 to 85 degrees")
-        check_hand(self.speed_mm_per_s, self.turn_deg_per_s)
-        if len(self.field_deg) * len(self.distance_mm) * len(self.azimuths) > MAX_POSES:
-            raise ValueError("trajectory has more than a million poses; give fewer angles or distances")
 
     @property
     def azimuths(self) -> tuple[float, ...]:

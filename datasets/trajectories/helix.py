@@ -7,12 +7,12 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from datasets.trajectories.view import PosedFrame
+from datasets.trajectories.view import KIND_MEANING, PosedFrame
 from eposit import Pose
 from eposit.arrays import Array
 from eposit.pose import rotation_error_vector, rotation_from_euler
-from render.sensor.motion import Rate
-from render.targets.chessboard import Target
+from render.sensor.motion import PoseRate
+from render.targets import Target
 
 HALF_STEP_S = 0.005  # of the helix's central difference: rounding and curvature both stay below 1e-9 of the rate
 
@@ -30,7 +30,7 @@ class Helix:
         Paper, section III. The start angles and the range of t are not in its text; they are inferred from its code.
     """
 
-    kind: Annotated[Literal["helix"], "helix, field, scatter or listed"] = "helix"
+    kind: Annotated[Literal["helix"], KIND_MEANING] = "helix"
     point: Annotated[
         Literal["board_centre", "origin"] | tuple[float, float, float],
         "point of the target that the helix carries: board_centre, origin, or [x, y, z] in mm",
@@ -69,7 +69,7 @@ class Helix:
         """Pose and rate at a time, the rate by a central difference."""
         before, after = (self.cam_from_obj(time_s + s * HALF_STEP_S, target) for s in (-1.0, 1.0))
         turn = rotation_error_vector(after.R, before.R)
-        rate = Rate((after.t - before.t) / (2.0 * HALF_STEP_S), turn / (2.0 * HALF_STEP_S))
+        rate = PoseRate((after.t - before.t) / (2.0 * HALF_STEP_S), turn / (2.0 * HALF_STEP_S))
         return PosedFrame(time_s, self.cam_from_obj(time_s, target), rate)
 
     def _point_in_obj(self, target: Target) -> Array:

@@ -8,11 +8,11 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from datasets.trajectories.view import MAX_POSES, SPEED_MEANING, TURN_MEANING, check_hand
+from datasets.trajectories.view import KIND_MEANING, MAX_POSES, SPEED_MEANING, TURN_MEANING, check_hand
 from eposit import Pose
 from eposit.pose import rotation_from_euler
 from render.sensor.presets import SensorModel
-from render.targets.chessboard import Target
+from render.targets import Target
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,7 +47,7 @@ class Listed:
         ValueError: no poses, too many, or a rate out of range.
     """
 
-    kind: Annotated[Literal["listed"], "helix, field, scatter or listed"] = "listed"
+    kind: Annotated[Literal["listed"], KIND_MEANING] = "listed"
     poses: Annotated[tuple[ListedPose, ...], "the poses, in their order, each a table of the keys below"]
     speed_mm_per_s: Annotated[float, SPEED_MEANING] = 100.0
     turn_deg_per_s: Annotated[float, TURN_MEANING] = 10.0

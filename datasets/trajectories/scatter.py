@@ -8,11 +8,11 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from datasets.trajectories.view import MAX_POSES, SPEED_MEANING, TURN_MEANING, check_hand
+from datasets.trajectories.view import KIND_MEANING, MAX_POSES, SPEED_MEANING, TURN_MEANING, check_hand
 from eposit import Camera, Pose
 from eposit.arrays import Array
 from eposit.pose import rotation_from_vector
-from render.targets.chessboard import Target
+from render.targets import Target
 
 MAX_TRIES = 2000
 Range = tuple[float, float]
@@ -29,7 +29,7 @@ class Scatter:
         ValueError: a value out of range.
     """
 
-    kind: Annotated[Literal["scatter"], "helix, field, scatter or listed"] = "scatter"
+    kind: Annotated[Literal["scatter"], KIND_MEANING] = "scatter"
     count: Annotated[int, "number of poses"] = 40
     depth_range_mm: Annotated[Range, "least and largest depth of the board's centre, mm"] = (2000.0, 2000.0)
     offset_range_mm: Annotated[

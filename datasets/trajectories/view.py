@@ -8,10 +8,11 @@ import numpy as np
 
 from eposit import Pose
 from eposit.arrays import Array
-from render.sensor.motion import Rate
-from render.targets.chessboard import Target
+from render.sensor.motion import PoseRate
+from render.targets import Target
 
 MAX_POSES = 1_000_000
+KIND_MEANING = "helix, field, scatter or listed"
 SPEED_MEANING = "speed of the hand-held board's centre in a random direction, mm/s; 0 stands still"
 TURN_MEANING = "rate at which the hand-held board turns about a random axis, degrees/s"
 
@@ -22,16 +23,16 @@ class PosedFrame:
 
     time_s: float  # on the trajectory; the pose's number where that has no time
     cam_from_obj: Pose
-    rate: Rate
+    rate: PoseRate
     defocus_radius_px: float | None = None  # of its pictures; None: the sensor's
 
 
 def hand_held(
     pose: Pose, target: Target, speed_mm_per_s: float, turn_deg_per_s: float, rng: np.random.Generator
-) -> Rate:
+) -> PoseRate:
     """The rate of a board held by hand: a speed and a rate of turning about its centre, each in a random direction."""
     velocity, axis = speed_mm_per_s * random_direction(rng), random_direction(rng)
-    return Rate.about(pose, target.board_centre, velocity, np.deg2rad(turn_deg_per_s) * axis)
+    return PoseRate.about(pose, target.board_centre, velocity, np.deg2rad(turn_deg_per_s) * axis)
 
 
 def random_direction(rng: np.random.Generator) -> Array:

@@ -14,8 +14,9 @@ from eposit import Camera
 from pipelines.detection import detect_points
 from render.analytic.image_circle import lens_coverage
 from render.frame import LinearImage, render_frame
-from render.region import Image, Region
+from render.region import Image
 from render.sensor.develop import FrameContext, develop
+from render.targets.image_region import Region
 
 
 def chosen_poses(recipe: Recipe, poses: int) -> list[int]:
@@ -47,14 +48,13 @@ def image_of(recipe: Recipe, frame: Frame, linear: LinearImage | None = None) ->
     """The developed picture of a frame, of its own light if none is given."""
     camera = frame.camera.true_camera()
     light = linear_of(recipe, frame) if linear is None else linear
-    shot = FrameContext(recipe.target, camera, frame.cam_from_obj, frame.rate, light.region, frame.sensor_seed)
-    return develop(light.full(camera), frame.sensor, shot)
+    context = FrameContext(recipe.target, camera, frame.cam_from_obj, frame.rate, light.region, frame.sensor_seed)
+    return develop(light.full(camera), frame.sensor, context)
 
 
 def over_background(recipe: Recipe, camera: Camera, film: Image, region: Region) -> LinearImage:
     """The light of a region from another renderer's film, (height, width, 2): radiance and share of hits."""
-    x, y, width, height = region
-    behind = np.maximum(lens_coverage(camera)[y : y + height, x : x + width] - film[..., 1], 0.0)
+    behind = np.maximum(lens_coverage(camera)[region.pixels] - film[..., 1], 0.0)
     return LinearImage(
         (film[..., 0] + recipe.light.background * behind).astype(np.float32), region, recipe.light.background
     )

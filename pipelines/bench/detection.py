@@ -15,7 +15,7 @@ from pipelines.bench.table import Figure, Row, compared
 from pipelines.bench.timing import Times, in_turn, total
 from pipelines.detection import SUBPIX_STOP, SUBPIX_WINDOW, detect_points
 from pipelines.detection.finders import SECTOR_FLAGS
-from render.targets.chessboard import Target
+from render.targets.chessboard import Chessboard
 
 PART = "detection"
 NAMES = ("findChessboardCorners, cornerSubPix", "findChessboardCornersSB, exhaustive, accuracy")
@@ -40,7 +40,7 @@ def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
     yield from _rows("one picture of each camera", every, poses)
 
 
-def classic(image: Grey, target: Target) -> bool:
+def classic(image: Grey, target: Chessboard) -> bool:
     """findChessboardCorners and cornerSubPix."""
     found, corners = cv2.findChessboardCorners(image, target.inner)
     if found:
@@ -48,16 +48,16 @@ def classic(image: Grey, target: Target) -> bool:
     return found
 
 
-def sector_based(image: Grey, target: Target) -> bool:
+def sector_based(image: Grey, target: Chessboard) -> bool:
     """findChessboardCornersSB as exact as it gets."""
     return cv2.findChessboardCornersSB(image, target.inner, flags=SECTOR_FLAGS)[0]
 
 
-def _ours(image: Grey, target: Target) -> bool:
+def _ours(image: Grey, target: Chessboard) -> bool:
     return bool(np.mean(detect_points(image, target).status == "ok") > 0.9)
 
 
-def _found(call: Callable[[Grey, Target], bool], images: list[Grey], target: Target) -> int:
+def _found(call: Callable[[Grey, Chessboard], bool], images: list[Grey], target: Chessboard) -> int:
     return sum(call(image, target) for image in images)
 
 

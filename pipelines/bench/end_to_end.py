@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import tempfile
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from datasets.store.dataset import Dataset
 from pipelines.bench.cases import chosen_poses
 from pipelines.bench.primary_rays import NAME, primary_rays
 from pipelines.bench.table import Row, compared
-from pipelines.bench.timing import Times, in_turn
+from pipelines.bench.timing import Times, in_turn, summary, timed
 from pipelines.detection import Detector
 from pipelines.stages import detect, estimate, generate, score
 from pipelines.stages.settings import Setting
@@ -35,8 +34,8 @@ def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
     )
     yield compared(PART, "all stages, a frame", own, NAME, floor, len(frames))
     for name, times in spent.items():
-        wall, cpu = sorted(t.wall for t in times[1:]), min(t.cpu for t in times[1:])  # the first round warms up
-        yield compared(PART, f"of which {name}", Times(wall[len(wall) // 2], cpu), NAME, floor, len(frames))
+        own = summary(times[1:])  # the first round warms up
+        yield compared(PART, f"of which {name}", own, NAME, floor, len(frames))
 
 
 def by_pose(recipe: Recipe) -> Recipe:
@@ -65,10 +64,12 @@ def run_stages(recipe: Recipe, poses: list[int], spent: dict[str, list[Times]] |
             ("score", score_shard),
         ]
         for name, step in steps:
-            wall, cpu = time.perf_counter(), time.process_time()
-            for pose in poses:
-                step(pose)
-            dataset.write_manifest()
+            _, times = timed(functools.partial(_run_step, dataset, step, poses))
             if spent is not None:
-                taken = Times(time.perf_counter() - wall, time.process_time() - cpu)
-                spent.setdefault(name, []).append(taken)
+                spent.setdefault(name, []).append(times)
+
+
+def _run_step(dataset: Dataset, step: Callable[[int], None], poses: list[int]) -> None:
+    for pose in poses:
+        step(pose)
+    dataset.write_manifest()

@@ -21,12 +21,12 @@ from pipelines.detection import detect_points
 from render import backend
 from render.pathtraced.fisheye import sensor_dict
 from render.pathtraced.scene import reference_scene
-from render.region import Region
+from render.targets.image_region import Region
 
 PART = "frame"
 PLAIN_SAMPLES = 64
 Film = NDArray[np.float32]
-WARM_UP: Region = (0, 0, 16, 16)  # compiles the plain kernel, which serves any region
+WARM_UP = Region.whole(16, 16)  # compiles the plain kernel, which serves any region
 _NAME = f"full picture, Mitsuba direct, {PLAIN_SAMPLES} rays"
 
 
@@ -75,7 +75,7 @@ def plain(recipe: Recipe, frame: Frame, samples: int = PLAIN_SAMPLES, region: Re
     """
     mi = backend.load()
     camera = frame.camera.true_camera()
-    region = (0, 0, camera.width, camera.height) if region is None else region
+    region = Region.whole(camera.width, camera.height) if region is None else region
     sensor = sensor_dict(camera, frame.cam_from_obj, region, samples)
     sensor["sampler"] = {"type": "independent", "sample_count": samples}
     integrator = mi.load_dict({"type": "direct", "emitter_samples": 1, "bsdf_samples": 0, "hide_emitters": True})

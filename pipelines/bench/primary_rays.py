@@ -58,7 +58,7 @@ def primary_rays(recipe: Recipe, frame: Frame) -> NDArray[np.float32]:
         inner = mi.Point2f(generator.next_float32(), generator.next_float32())
         corner = mi.Point2f(mi.Float(pixel - row * columns), mi.Float(row + dr.opaque(mi.UInt32, top)))
         ray, _ = sensor.sample_ray(mi.Float(0.0), mi.Float(0.0), (corner + inner) / size, mi.Point2f(0.0))
-        hit = scene.ray_intersect(ray, mi.RayFlags.Minimal | mi.RayFlags.UV | mi.RayFlags.ShadingFrame, True)
+        hit = scene.ray_intersect(ray, mi.RayFlags.Minimal | mi.RayFlags.UV | mi.RayFlags.ShadingFrame, mi.Bool(True))
         reflectance = hit.bsdf().eval_diffuse_reflectance(hit, hit.is_valid())[0]
         sums.append(np.array(dr.block_sum(dr.select(hit.is_valid(), reflectance, 0.0), RAYS)))
     return np.concatenate(sums)

@@ -64,8 +64,7 @@ def _steps(recipe: Recipe, frame: Frame, folder: Path) -> Iterator[tuple[str, Ca
 
 
 def _detection(image: Any, target: Any) -> Iterator[tuple[str, Call, str, Call]]:
-    x, y, width, height = textured_region(image)
-    part = image[y : y + height, x : x + width]
+    part = image[textured_region(image).pixels]
     finder = functools.partial(cv2.findChessboardCorners, part, target.inner, flags=CLASSIC_FLAGS)
     yield "find the board", functools.partial(find_board, image, target), "OpenCV's finder on its region", finder
     board = find_board(image, target)

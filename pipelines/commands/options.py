@@ -1,4 +1,8 @@
-"""Options and arguments of the commands, each named once."""
+"""Options and arguments of the commands, each named once.
+
+Showing help loads nothing heavy, so words and defaults that the stages know stand here, and in the commands, a second
+time; a test compares them.
+"""
 
 from __future__ import annotations
 

@@ -136,7 +136,8 @@ def recipes(json: o.Json = False) -> None:
 
 
 def describe(recipe: o.ShownRecipe = None, json: o.Json = False) -> None:
-    """Every key of a recipe with its meaning: its defaults and the sensor's regimes, or a recipe's values."""
+    """Every key of a recipe with its meaning: its defaults, the sensor's regimes and cameras to name, or its values."""
+    from datasets.recipe.camera_sets import camera_rows
     from datasets.recipe.model import describe as keys
     from datasets.recipe.model import load_recipe, values
     from render.sensor.presets import regime_rows, regimes
@@ -150,6 +151,7 @@ def describe(recipe: o.ShownRecipe = None, json: o.Json = False) -> None:
         told: dict[str, object] = {"keys": [dict(zip(titles, row, strict=True)) for row in rows]}
         if not recipe:
             told["regimes"] = {f"sensor.{key}": dict(zip(names, row, strict=True)) for key, row in regime_rows()}
+            told["cameras"] = {name: asdict(camera) for name, camera in camera_rows()}
         print_json(told)
         return
     print_keys(rows)
@@ -157,3 +159,9 @@ def describe(recipe: o.ShownRecipe = None, json: o.Json = False) -> None:
         typer.echo("\nThe sensor's regimes:\n")
         columns = (Column("key"), *(Column(name, number=True) for name in names))
         print_table(columns, [(f"sensor.{key}", *map(str, row)) for key, row in regime_rows()])
+        typer.echo("\nCameras that a recipe can name:\n")
+        numbers = ("fx", "fy", "cx", "cy", "width", "height", "nominal_f")
+        columns = (Column("cameras.from"), *(Column(name, number=True) for name in numbers))
+        print_table(
+            columns, [(name, *(str(getattr(camera, key)) for key in numbers)) for name, camera in camera_rows()]
+        )

@@ -14,7 +14,7 @@ from pipelines.detection.board_map import BoardMap, grid
 from pipelines.detection.circle import find_circle
 from pipelines.detection.corners import BAD_SHARE, Corners, refine_corners, unrefined
 from pipelines.detection.finders import Grey, find_board, find_sector_based
-from render.targets.chessboard import Target
+from render.targets.chessboard import Chessboard
 
 CIRCLE_CLEARANCE = 1.3  # squares from the circle's foot within which the first, rough corners are not trusted
 SUBPIX_WINDOW = (5, 5)
@@ -38,9 +38,12 @@ class PointStatus(StrEnum):
     CIRCLE_NOT_FOUND = "circle_not_found"  # no dark disc where the board puts the circle
 
 
+STATUS_TYPE = np.dtype(f"<U{max(len(status) for status in PointStatus)}")
+
+
 @dataclass(frozen=True, slots=True)
 class Detection:
-    """Points of one image in the order of `Target.points`."""
+    """Points of one image in the order of `Chessboard.points`."""
 
     points_px: Array  # (n, 2), NaN where the status is not ok
     covariance_px2: Array  # (n, 2, 2) of each point, NaN likewise
@@ -49,7 +52,7 @@ class Detection:
     blur_px: float  # median blur of the edges, NaN if none
 
 
-def detect_points(image: Grey, target: Target, detector: str = Detector.EDGE_FIT) -> Detection:
+def detect_points(image: Grey, target: Chessboard, detector: str = Detector.EDGE_FIT) -> Detection:
     """Corners and circle of the target in an 8-bit image (height, width).
 
     Raises:
@@ -71,7 +74,7 @@ def detect_points(image: Grey, target: Target, detector: str = Detector.EDGE_FIT
         return _nothing(count, PointStatus.CORNERS_INCONSISTENT, found.finder)
     circle = find_circle(image, corners.board, corners.blur_px, corners.contrast, target)
     points, covariance = np.full((count, 2), np.nan), np.full((count, 2, 2), np.nan)
-    status = np.array([PointStatus.CORNERS_INCONSISTENT] * count, dtype="<U24")
+    status = np.full(count, PointStatus.CORNERS_INCONSISTENT, STATUS_TYPE)
     good = np.append(corners.consistent, circle is not None)
     points[:-1], covariance[:-1], status[-1] = corners.points_px, corners.covariance_px2, PointStatus.CIRCLE_NOT_FOUND
     if circle is not None:
@@ -81,7 +84,7 @@ def detect_points(image: Grey, target: Target, detector: str = Detector.EDGE_FIT
     return Detection(points, covariance, status, found.finder, corners.blur_px)
 
 
-def _corners(image: Grey, found_px: Array, target: Target, detector: str) -> Corners:
+def _corners(image: Grey, found_px: Array, target: Chessboard, detector: str) -> Corners:
     at, size = grid(target.inner), (image.shape[1], image.shape[0])
     foot = target.circle_centre[:2] / target.square_mm
     clear = np.linalg.norm(at - foot, axis=1) > CIRCLE_CLEARANCE
@@ -96,7 +99,5 @@ def _corners(image: Grey, found_px: Array, target: Target, detector: str) -> Cor
 
 
 def _nothing(count: int, status: PointStatus, finder: str) -> Detection:
-    return Detection(
-        np.full((count, 2), np.nan), np.full((count, 2, 2), np.nan), np.array([status] * count, dtype="<U24"), finder,
-        float("nan"),
-    )  # fmt: skip
+    statuses = np.full(count, status, STATUS_TYPE)
+    return Detection(np.full((count, 2), np.nan), np.full((count, 2, 2), np.nan), statuses, finder, float("nan"))

@@ -28,7 +28,7 @@ from pipelines.detection.circle_model import (
 )
 from pipelines.detection.finders import Grey
 from pipelines.detection.kernels import ordered
-from render.targets.chessboard import Target
+from render.targets.chessboard import Chessboard
 from render.targets.disc_shade import blocked_share
 
 FINE, COARSE = 3, 2  # cells to a pixel along each side: for small patches, for large ones
@@ -54,7 +54,7 @@ class Circle:
     covariance_px2: Array  # (2, 2)
 
 
-def find_circle(image: Grey, board: BoardMap, blur_px: float, contrast: float, target: Target) -> Circle | None:
+def find_circle(image: Grey, board: BoardMap, blur_px: float, contrast: float, target: Chessboard) -> Circle | None:
     """The circle's centre, or None if there is no dark disc where the board puts it.
 
     blur_px, contrast: of the board's edges.
@@ -101,7 +101,7 @@ def _kernel(blur_px: float, finer: int) -> Array:
 
 
 def _patch(
-    image: Grey, board: BoardMap, centre: Array, jacobian: Array, blur_px: float, target: Target
+    image: Grey, board: BoardMap, centre: Array, jacobian: Array, blur_px: float, target: Chessboard
 ) -> Patch | None:
     """The pixels around the circle that see it or its white square; None if it reaches out of the image."""
     at, height = target.circle_centre[:2] / target.square_mm, target.circle_height_mm / target.square_mm

@@ -10,7 +10,7 @@ from eposit.arrays import Array, Mask
 from pipelines.detection.board_map import BoardMap, grid, normal_angles
 from pipelines.detection.corner_model import BLUR, CONTRAST, MEAN, SHAPE, SLOPE, CornerTask, fit_corners
 from pipelines.detection.finders import Grey
-from render.targets.chessboard import Target
+from render.targets.chessboard import Chessboard
 
 FIRST_WINDOW_PX, WINDOW_PX = 5, 10  # half side of the pixels that the first and the final fit may use
 FIRST_STEPS, STEPS = 5, 12
@@ -32,7 +32,7 @@ PRIOR_FREEDOM = 10.0  # degrees of freedom with which the pixels' own noise coun
 
 @dataclass(frozen=True, slots=True)
 class Corners:
-    """Refined corners in the order of `Target.corners`."""
+    """Refined corners in the order of `Chessboard.corners`."""
 
     points_px: Array  # (n, 2)
     covariance_px2: Array  # (n, 2, 2)
@@ -42,7 +42,7 @@ class Corners:
     board: BoardMap  # through the consistent ones
 
 
-def refine_corners(image: Grey, board: BoardMap, target: Target) -> Corners:
+def refine_corners(image: Grey, board: BoardMap, target: Chessboard) -> Corners:
     """Fit every corner near where `board` puts it, clear of the circle: once near by, then over the whole window."""
     at, size = grid(target.inner), (image.shape[1], image.shape[0])
     near, found = _fit(image, board, target, _start_shapes(board, at, START_BLUR_PX), FIRST_WINDOW_PX, FIRST_STEPS)
@@ -76,7 +76,9 @@ def _start_shapes(board: BoardMap, at: Array, blur_px: float) -> Array:
     return shapes
 
 
-def _fit(image: Grey, board: BoardMap, target: Target, shapes: Array, window: int, steps: int) -> tuple[Corners, Array]:
+def _fit(
+    image: Grey, board: BoardMap, target: Chessboard, shapes: Array, window: int, steps: int
+) -> tuple[Corners, Array]:
     """One pass over all corners, and their shapes; consistent is what converged to a corner of the right sense."""
     at = grid(target.inner)
     starts, jacobian = board(at), board.jacobian(at)
@@ -109,7 +111,7 @@ def _fit(image: Grey, board: BoardMap, target: Target, shapes: Array, window: in
     return Corners(points, covariance, good, float(blur), float(contrast), board), fitted
 
 
-def _sense(target: Target) -> Array:
+def _sense(target: Chessboard) -> Array:
     """(n,) sign of a corner's contrast.
 
     `normal_angles` points one normal along x and the other against y, so that the first square, which is black, lies
@@ -118,7 +120,7 @@ def _sense(target: Target) -> Array:
     return np.where(grid(target.inner).sum(axis=1) % 2 == 0, 1.0, -1.0)
 
 
-def _around_circle(board: BoardMap, target: Target) -> tuple[Array, Array]:
+def _around_circle(board: BoardMap, target: Chessboard) -> tuple[Array, Array]:
     """Ellipses to leave out: the circle's foot and where its height may displace it; from px to the unit circle."""
     foot, height = target.circle_centre[:2] / target.square_mm, target.circle_height_mm / target.square_mm
     base, jacobian = board(foot), board.jacobian(foot)

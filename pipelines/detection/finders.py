@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eposit.arrays import Array
-from render.targets.chessboard import Target
+from render.targets.chessboard import Chessboard
+from render.targets.image_region import Region
 
 Grey = NDArray[np.uint8]
 
@@ -31,11 +32,11 @@ LEAST_GRADIENT = 16  # grey values between neighbours that count as texture
 class Found:
     """A complete board in an image, to about a pixel."""
 
-    corners_px: Array  # (n, 2) in the order of `Target.corners`
+    corners_px: Array  # (n, 2) in the order of `Chessboard.corners`
     finder: str  # which finder saw it
 
 
-def find_board(image: Grey, target: Target) -> Found | None:
+def find_board(image: Grey, target: Chessboard) -> Found | None:
     """The board's corners, or None if no finder sees a complete board that can be put in order."""
     for name, finder in FINDERS.items():
         corners = finder(image, target.inner)
@@ -47,7 +48,7 @@ def find_board(image: Grey, target: Target) -> Found | None:
     return None
 
 
-def find_sector_based(image: Grey, target: Target) -> Found | None:
+def find_sector_based(image: Grey, target: Chessboard) -> Found | None:
     """The board as `cv2.findChessboardCornersSB` alone sees it, to its own accuracy."""
     corners = _sector_based(image, target.inner)
     ordered = None if corners is None else _ordered(image, corners.reshape(-1, 2), target)
@@ -99,27 +100,27 @@ def _worth_trying(part: Grey, inner: tuple[int, int]) -> bool:
 
 
 def _region_of(image: Grey) -> tuple[Grey, Array]:
-    x, y, width, height = textured_region(image)
-    return image[y : y + height, x : x + width], np.array([x, y], np.float64)
+    region = textured_region(image)
+    return image[region.pixels], np.array([region.x, region.y], np.float64)
 
 
-def textured_region(image: Grey) -> tuple[int, int, int, int]:
-    """x, y, width, height of the pixels with strong edges and a margin; the whole image if there are none."""
+def textured_region(image: Grey) -> Region:
+    """The pixels with strong edges and a margin; the whole image if there are none."""
     small = cv2.resize(image, None, fx=1.0 / DECIMATION, fy=1.0 / DECIMATION, interpolation=cv2.INTER_LINEAR)
     gradient = cv2.morphologyEx(small, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))
     strong = gradient > max(LEAST_GRADIENT, int(gradient.max()) // 3)
     columns, rows = np.flatnonzero(strong.any(axis=0)), np.flatnonzero(strong.any(axis=1))
     if not len(columns):
-        return 0, 0, image.shape[1], image.shape[0]
+        return Region.whole(image.shape[1], image.shape[0])
     x0, y0 = (max(0, DECIMATION * int(line[0]) - REGION_MARGIN_PX) for line in (columns, rows))
     x1, y1 = (
         min(size, DECIMATION * (int(line[-1]) + 1) + REGION_MARGIN_PX)
         for line, size in ((columns, image.shape[1]), (rows, image.shape[0]))
     )
-    return x0, y0, x1 - x0, y1 - y0
+    return Region.between((x0, y0), (x1, y1))
 
 
-def _ordered(image: Grey, corners: Array, target: Target) -> Array | None:
+def _ordered(image: Grey, corners: Array, target: Chessboard) -> Array | None:
     """Corners in the target's order: x to y turns as the image's axes do, and the first square is the black one."""
     across, down = target.inner
     grid = corners.reshape(down, across, 2)

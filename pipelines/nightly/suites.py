@@ -139,7 +139,9 @@ def _digest(parts: Sequence[str]) -> str:
 
 def pictures_digest(dataset: Dataset) -> str:
     """Hash of the decoded content of a dataset's pictures and their truth."""
-    tables = [table_digest(dataset.read_shard(path)) for name in ("frames", "keypoints") for path in dataset.shards(name)]
+    tables = [
+        table_digest(dataset.read_shard(path)) for name in ("frames", "keypoints") for path in dataset.shards(name)
+    ]
     if not tables:
         raise UserError(f"{dataset.root} holds no pictures; delete it, and the next night makes them again")
     return _digest(tables)

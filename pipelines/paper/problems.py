@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import norm
 
+from datasets.recipe.camera_sets import set_cameras
 from datasets.trajectories.helix import Helix
 from eposit import Camera, Pose, Solution
 from eposit.arrays import Array, Mask
 from eposit.pose import rotation_error_vector, rotation_from_vector
 from eposit.refine.weights import covariance, normal_equations, whitening
-from render.targets.chessboard import Target
+from render.targets.chessboard import Chessboard
 
 OBJECT = np.array([(0.0, 0.0, 0.0), (200.0, 0.0, 0.0), (0.0, 200.0, 0.0), (0.0, 0.0, -50.0)])  # the paper's, mm
 SIGMA_PX = 0.4  # the paper's noise
+EXACT_RAD = 1e-6  # rotation error below which a pose from exact points is the true one
 DISTANCE_MM = 2000.0
 SIDE_MM = 200.0  # of the cube of more points
 CLOUD_SEED = 55
@@ -22,14 +25,17 @@ NORMAL_MEDIAN = float(norm.ppf(0.75))  # of the absolute value, over the standar
 
 def camera_with(lens: str) -> Camera:
     """The paper's true camera: pinhole intrinsics for the perspective lens, fish-eye intrinsics for the others."""
-    if lens == "perspective":
-        return Camera(lens=lens, fx=1378.65, fy=1381.37, cx=807.41, cy=602.47, width=1600, height=1200)
-    return fisheye_with(lens)
+    return set_cameras("paper")[lens].true_camera()
+
+
+def nominal_camera_with(lens: str) -> Camera:
+    """The same as a user without calibration assumes it: nominal focal length and image centre."""
+    return set_cameras("paper")[lens].nominal_camera()
 
 
 def fisheye_with(lens: str) -> Camera:
     """The paper's fish-eye intrinsics with any lens."""
-    return Camera(lens=lens, fx=552.39, fy=552.69, cx=782.41, cy=613.71, width=1600, height=1200)
+    return camera_with("equidistance").replace(lens=lens)
 
 
 def cloud(n: int) -> Array:
@@ -45,13 +51,22 @@ def stacked(poses: list[Pose]) -> Pose:
 
 def helix(step: float = 1.0) -> Pose:
     """The paper's 361 poses of M0 on its helix, or every `step` seconds."""
-    path, target = Helix(point="origin", step=step), Target()
-    return stacked([path.cam_from_obj(time, target) for time in path.times()])
+    return poses_on(Helix(point="origin", step=step))
+
+
+def poses_on(path: Helix) -> Pose:
+    """A helix's poses of the paper's board, one for each of its times."""
+    return stacked([path.cam_from_obj(time, Chessboard()) for time in path.times()])
+
+
+def taken(pose: Pose, order: NDArray[np.intp]) -> Pose:
+    """The poses of these numbers."""
+    return Pose(pose.R[order], pose.t[order])
 
 
 def repeated(pose: Pose, draws: int) -> Pose:
     """Each pose `draws` times in a row."""
-    return Pose(np.repeat(pose.R, draws, axis=0), np.repeat(pose.t, draws, axis=0))
+    return taken(pose, np.repeat(np.arange(len(pose.t)), draws))
 
 
 def at_field_angle(degrees: float, count: int, seed: int) -> Pose:

@@ -12,6 +12,7 @@ from datasets.store.images import encode_png
 from eposit.arrays import Array
 from pipelines.report.data import ERRORS, Series
 from pipelines.report.svg import STYLE, svg
+from render.targets.image_region import Region
 
 BOXES = ("rx_error_deg", "ry_error_deg", "rz_error_deg", "tx_error_mm", "ty_error_mm", "tz_error_mm")
 
@@ -47,23 +48,23 @@ def boxes(item: Series, frames: dict[int, dict[str, Any]]) -> str:
         return svg(figure)
 
 
-def picture(image: Any, region: tuple[int, int, int, int], points: Array, width: int = 300) -> str:
+def picture(image: Any, region: Region, points: Array, width: int = 300) -> str:
     """The region of an image with its detected points drawn on it, as SVG with the PNG inside."""
-    x, y, w, h = region
-    data = base64.b64encode(encode_png(np.ascontiguousarray(image[y : y + h, x : x + w]))).decode()
-    size = 0.006 * max(w, h)
+    data = base64.b64encode(encode_png(np.ascontiguousarray(image[region.pixels]))).decode()
+    size = 0.006 * max(region.width, region.height)
     marks: list[str] = []
     for i, (u, v) in enumerate(points):
         if not np.isfinite(u):
             continue
         # Pixel centres are at integers, an SVG picture's pixel i covers [i, i + 1).
-        px, py = u - x + 0.5, v - y + 0.5
+        px, py = u - region.x + 0.5, v - region.y + 0.5
         colour = "#e8590c" if i == len(points) - 1 else "#1c7ed6" if i else "#2f9e44"
         marks.append(
             f'<path d="M{px - size:.2f} {py:.2f}h{2 * size:.2f}M{px:.2f} {py - size:.2f}v{2 * size:.2f}" '
             f'stroke="{colour}" stroke-width="{size / 3:.2f}"/>'
         )
     return (
-        f'<svg viewBox="0 0 {w} {h}" width="{width}" xmlns="http://www.w3.org/2000/svg">'
-        f'<image href="data:image/png;base64,{data}" width="{w}" height="{h}"/>{"".join(marks)}</svg>'
+        f'<svg viewBox="0 0 {region.width} {region.height}" width="{width}" xmlns="http://www.w3.org/2000/svg">'
+        f'<image href="data:image/png;base64,{data}" width="{region.width}" height="{region.height}"/>'
+        f"{''.join(marks)}</svg>"
     )

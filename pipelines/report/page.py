@@ -18,6 +18,7 @@ from pipelines.report import figures
 from pipelines.report.data import ERRORS, normalised_rows, score_rows, series
 from pipelines.report.points import field_rows, point_errors, tilt_rows
 from pipelines.report.template import rendered
+from render.targets.image_region import Region
 
 REPORT = "report.html"
 TEMPLATE = Path(__file__).with_name("page.html")
@@ -37,7 +38,7 @@ def write_report(dataset: Dataset) -> Path:
         "tilt_deg",
         "cx_px",
         "cy_px",
-        *(f"region_{a}_px" for a in ("x", "y", "width", "height")),
+        *(f"region_{a}_px" for a in Region._fields),
     ]
     frames = dataset.read("frames", columns).to_pylist()
     by_id = {frame["frame_id"]: frame for frame in frames}
@@ -83,9 +84,9 @@ def _gallery(dataset: Dataset, frames: list[dict[str, Any]]) -> list[dict[str, A
             if frame_id not in chosen:
                 continue
             frame = next(frame for frame in frames if frame["frame_id"] == frame_id)
-            region = tuple(frame[f"region_{a}_px"] for a in ("x", "y", "width", "height"))
+            region = Region(*(frame[f"region_{a}_px"] for a in Region._fields))
             marked = points.get(frame_id, none)
-            svg = figures.picture(decode_image(image, path, frame_id), region, marked)  # type: ignore[arg-type]
+            svg = figures.picture(decode_image(image, path, frame_id), region, marked)
             found = int(np.isfinite(marked[:, 0]).sum())
             pictures.append({**frame, "svg": svg, "found": found, "total": len(marked)})
     return pictures

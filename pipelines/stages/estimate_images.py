@@ -22,9 +22,9 @@ from pipelines.adapters.results import PoseResult, stack
 from pipelines.adapters.user import attempt, check_call, load_function
 from pipelines.stages.estimate import path_of_shard
 from pipelines.stages.settings import ALL, IMAGE, System, assumed
-from render.targets.chessboard import Target
+from render.targets.chessboard import Chessboard
 
-Estimator = Callable[[NDArray[np.uint8], Camera, Target], Any]
+Estimator = Callable[[NDArray[np.uint8], Camera, Chessboard], Any]
 
 
 def find_estimator(name: str) -> Estimator:

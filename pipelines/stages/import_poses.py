@@ -13,6 +13,7 @@ import pyarrow.parquet as pq
 
 from datasets.errors import UserError
 from datasets.plan import shard_count
+from datasets.rows import POSITION_COLUMNS, QUATERNION_COLUMNS
 from datasets.store.dataset import Dataset
 from datasets.store.digest import table_digest
 from eposit import Pose, Status
@@ -25,9 +26,8 @@ from pipelines.stages.estimate_images import system_rows
 from pipelines.stages.settings import System
 
 FRAME = "frame_id"
-QUATERNION = tuple(f"q_{axis}" for axis in "wxyz")
 MATRIX = tuple(f"r{row}{column}" for row in "123" for column in "123")
-POSITIONS = (tuple(f"t_{axis}_mm" for axis in "xyz"), tuple(f"t{axis}" for axis in "xyz"))
+POSITIONS = (POSITION_COLUMNS, tuple(f"t{axis}" for axis in "xyz"))
 FORM = "frame_id, q_w q_x q_y q_z or r11 to r33, and t_x_mm t_y_mm t_z_mm or tx ty tz in mm"
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,63}")
 TOLERANCE = 1e-3  # of a quaternion's length and of R^T R - 1: three decimals
@@ -78,7 +78,7 @@ def read_poses(path: Path) -> dict[int, PoseResult]:
         UserError: what is wrong with the file, its columns or its first wrong row.
     """
     columns = _columns(path)
-    rotation = _chosen(path, columns, (QUATERNION, MATRIX))
+    rotation = _chosen(path, columns, (QUATERNION_COLUMNS, MATRIX))
     position = _chosen(path, columns, POSITIONS)
     numbers = {name: _numbers(path, name, columns[name]) for name in (FRAME, *rotation, *position)}
     frames = _frames(path, numbers[FRAME])
@@ -93,6 +93,10 @@ def read_poses(path: Path) -> dict[int, PoseResult]:
 
 def _columns(path: Path) -> dict[str, list[Any]]:
     """Name to values; of CSV they are text.
+
+    `csv` reads it and not `pyarrow.csv`, which guesses types (`true` becomes 1, text that is not UTF-8 becomes bytes, a
+    wrong number a column of text), keeps blanks before names and quotes, and counts lines without the empty ones: it
+    could not say which value of which line is wrong.
 
     Raises:
         UserError: a file that cannot be read.
@@ -173,7 +177,7 @@ def _pose(path: Path, frame: int, rotation: Array, t: Array) -> PoseResult:
     where = f"{path}, frame_id {frame}"
     if not (np.all(np.isfinite(rotation)) and np.all(np.isfinite(t))):
         raise UserError(f"{where}: the pose has values that are not finite; a failure leaves all of them empty")
-    if len(rotation) == len(QUATERNION):
+    if len(rotation) == len(QUATERNION_COLUMNS):
         length = float(np.linalg.norm(rotation))
         if abs(length - 1.0) > TOLERANCE:
             raise UserError(f"{where}: the quaternion has length {length:.6g}; it must be 1 to within {TOLERANCE:g}")

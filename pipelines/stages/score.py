@@ -12,11 +12,21 @@ from datasets.rows import poses, table
 from datasets.schema import COMPONENTS, SCORES
 from datasets.store.dataset import Dataset
 from eposit import Status
-from eposit.arrays import Array
+from eposit.arrays import Array, Mask
 from eposit.pose import euler_error_rad, rotation_error_rad, rotation_error_vector
 
 KEY = ("frame_id", "solver", "point_source", "assumed_camera", "point_set", "noise_draw", "status")
 GROSS_FAILURE_FACTOR = 2.0  # the paper's star: "at least twice larger than the ground truth"
+
+
+def is_gross_failure(failed: Mask, found_t: Array, true_t: Array) -> Mask:
+    """(b,) whether there is no pose, or one at least GROSS_FAILURE_FACTOR times as far away as the true one.
+
+    failed: (b,). found_t, true_t: (b, 3), one unit; NaN where there is none.
+    """
+    with np.errstate(invalid="ignore"):
+        far = np.linalg.norm(found_t, axis=1) >= GROSS_FAILURE_FACTOR * np.linalg.norm(true_t, axis=1)
+    return failed | far
 
 
 def targets(dataset: Dataset, indices: Container[int]) -> list[Path]:
@@ -49,9 +59,6 @@ def run_shard(dataset: Dataset, estimates: Path) -> None:
     t_error = found.t - true.t
     euler = np.degrees(euler_error_rad(found.R, true.R))
     failed = rows["status"].to_numpy(zero_copy_only=False) != Status.OK
-    length = np.linalg.norm(found.t, axis=1)
-    with np.errstate(invalid="ignore"):
-        gross = failed | (length >= GROSS_FAILURE_FACTOR * np.linalg.norm(true.t, axis=1))
     columns = {name: rows[name] for name in KEY}
     scores = {
         "rotation_error_deg": np.degrees(rotation_error_rad(found.R, true.R)),
@@ -59,7 +66,7 @@ def run_shard(dataset: Dataset, estimates: Path) -> None:
         **{f"t{axis}_error_mm": t_error[:, i] for i, axis in enumerate("xyz")},
         "t_error_relative": np.linalg.norm(t_error, axis=1) / np.linalg.norm(true.t, axis=1),
         "reprojection_rmse_px": rows["reprojection_rmse_px"],
-        "gross_failure": gross,
+        "gross_failure": is_gross_failure(failed, found.t, true.t),
         **_normalised(rows, rotation_error_vector(found.R, true.R), t_error),
     }
     arrays = {

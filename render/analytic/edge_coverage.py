@@ -7,15 +7,14 @@ edge what thousands of random rays would, without their noise.
 
 from __future__ import annotations
 
-from typing import Any
-
 from render import backend
+from render.device import DeviceFloat
 
 
-def share_beyond(value: Any, along_x: Any, along_y: Any) -> Any:
+def positive_share(value: DeviceFloat, along_x: DeviceFloat, along_y: DeviceFloat) -> DeviceFloat:
     """Share, 0 to 1, of a cell where value + along_x s + along_y t is positive.
 
-    value: at the cell's middle. along_x, along_y: its change over the cell's width and height. What is not finite
+    value: at the cell's centre. along_x, along_y: its change over the cell's width and height. What is not finite
     counts as all on the value's side.
     """
     dr = backend.jit()
@@ -30,7 +29,7 @@ def share_beyond(value: Any, along_x: Any, along_y: Any) -> Any:
     return 0.5 + dr.select(value < 0.0, -share, share)
 
 
-def half_reach(along_x: Any, along_y: Any) -> Any:
-    """The largest change of a linear quantity from a cell's middle to its corners."""
+def half_range(along_x: DeviceFloat, along_y: DeviceFloat) -> DeviceFloat:
+    """The largest change of a linear quantity from a cell's centre to its corners."""
     dr = backend.jit()
     return 0.5 * (dr.abs(along_x) + dr.abs(along_y))

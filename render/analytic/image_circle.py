@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import functools
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eposit import Camera
 from render import backend
+from render.device import DeviceFloat
 
-EDGE_SAMPLES = 16  # subpixels along each side on the image circle's circle_radius
+EDGE_SAMPLES = 16  # subpixels along each side of a pixel that the circle's rim crosses
 
 
 @functools.lru_cache(maxsize=8)
@@ -34,6 +34,6 @@ def lens_coverage(camera: Camera) -> NDArray[np.float32]:
 
 
 @functools.lru_cache(maxsize=8)
-def uploaded_coverage(camera: Camera) -> Any:
+def device_coverage(camera: Camera) -> DeviceFloat:
     """`lens_coverage`, row by row, as a Dr.Jit array."""
     return backend.load().Float(lens_coverage(camera).ravel())

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from eposit import Camera, Pose
 from render import backend
-from render.lens_law import DeviceLens, device_lens, sine_cosine
+from render.device import DeviceBool, DeviceFloat, DeviceVector3
+from render.lens_law import DeviceLens, device_lens, incidence_angle
 
 
 @dataclass(frozen=True, slots=True)
-class Bundle:
+class RayBundle:
     """Rays through points of the picture: directions in the object frame and their change over a pixel."""
 
-    direction: Any  # Vector3f of unit length
-    along_x: Any  # Vector3f, change of the direction for one pixel along x
-    along_y: Any  # Vector3f, for one pixel along y
-    seen: Any  # Bool, whether the point lies inside the lens's image circle
+    direction: DeviceVector3  # of unit length
+    along_x: DeviceVector3  # change of the direction for one pixel along x
+    along_y: DeviceVector3  # for one pixel along y
+    seen: DeviceBool  # whether the point lies inside the lens's image circle
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,32 +25,38 @@ class DeviceCamera:
     """A camera at a pose, uploaded."""
 
     law: DeviceLens
-    focal: list[Any]  # fx, fy, px
-    centre: list[Any]  # cx, cy, px
-    rotation: list[Any]  # nine numbers of obj_from_cam, row by row
-    origin: list[Any]  # camera centre in the object frame, mm
+    focal: list[DeviceFloat]  # fx, fy, px
+    centre: list[DeviceFloat]  # cx, cy, px
+    rotation: list[DeviceFloat]  # nine numbers of obj_from_cam, row by row
+    origin: list[DeviceFloat]  # camera centre in the object frame, mm
 
-    def rays(self, x_px: Any, y_px: Any) -> Bundle:
-        """Rays through points of the picture, px, pixel centres at integers."""
-        mi, dr = backend.load(), backend.jit()
-        x, y = (x_px - self.centre[0]) / self.focal[0], (y_px - self.centre[1]) / self.focal[1]
-        radius = dr.sqrt(x * x + y * y)
-        sine, cosine, slope = sine_cosine(mi, dr, self.law, dr.minimum(radius, self.law.rho_max))
-        off_axis = radius > 0.0
-        inverse = dr.select(off_axis, 1.0 / radius, 0.0)
-        side = dr.select(off_axis, sine * inverse, 1.0)
+    def rays(self, x_px: DeviceFloat, y_px: DeviceFloat) -> RayBundle:
+        """Rays through points of the picture, px, pixel centres at integers.
+
+        In camera axes the direction is (x side, y side, cos theta) with side = sin theta / rho. Along the radius
+        (ex, ey) it changes by the slope of theta, across it by `side`.
+        """
+        dr = backend.jit()
+        fx, fy = self.focal
+        x, y = (x_px - self.centre[0]) / fx, (y_px - self.centre[1]) / fy
+        rho = dr.sqrt(x * x + y * y)
+        theta = incidence_angle(self.law, dr.minimum(rho, self.law.rho_max))
+        off_axis = rho > 0.0
+        inverse = dr.select(off_axis, 1.0 / rho, 0.0)
+        side = dr.select(off_axis, theta.sine * inverse, 1.0)
         ex, ey = x * inverse, y * inverse
-        # direction = (x side, y side, cosine): along the radius the sine's slope counts, across it `side`.
-        bend, fall = dr.select(off_axis, cosine * slope - side, 0.0), -sine * slope
-        in_cam = (x * side, y * side, cosine)
-        step_x = ((side + bend * ex * ex) / self.focal[0], bend * ex * ey / self.focal[0], fall * ex / self.focal[0])
-        step_y = (bend * ex * ey / self.focal[1], (side + bend * ey * ey) / self.focal[1], fall * ey / self.focal[1])
-        direction, along_x, along_y = (self._turn(mi, vector) for vector in (in_cam, step_x, step_y))
-        return Bundle(direction, along_x, along_y, radius <= self.law.rho_max)
+        radial = dr.select(off_axis, theta.cosine * theta.slope - side, 0.0)  # beyond what it changes across
+        axial = -theta.sine * theta.slope
+        in_cam = (x * side, y * side, theta.cosine)
+        per_pixel_x = ((side + radial * ex * ex) / fx, radial * ex * ey / fx, axial * ex / fx)
+        per_pixel_y = (radial * ex * ey / fy, (side + radial * ey * ey) / fy, axial * ey / fy)
+        direction, along_x, along_y = (self._to_object(vector) for vector in (in_cam, per_pixel_x, per_pixel_y))
+        return RayBundle(direction, along_x, along_y, rho <= self.law.rho_max)
 
-    def _turn(self, mi: Any, v: tuple[Any, Any, Any]) -> Any:
+    def _to_object(self, v: tuple[DeviceFloat, DeviceFloat, DeviceFloat]) -> DeviceVector3:
+        """A vector turned from camera axes to the object's."""
         r = self.rotation
-        return mi.Vector3f(*(r[i] * v[0] + r[i + 1] * v[1] + r[i + 2] * v[2] for i in (0, 3, 6)))
+        return backend.load().Vector3f(*(r[i] * v[0] + r[i + 1] * v[1] + r[i + 2] * v[2] for i in (0, 3, 6)))
 
 
 def device_camera(camera: Camera, cam_from_obj: Pose) -> DeviceCamera:
@@ -58,5 +64,6 @@ def device_camera(camera: Camera, cam_from_obj: Pose) -> DeviceCamera:
     mi, dr = backend.load(), backend.jit()
     obj_from_cam = cam_from_obj.inverse()
     numbers = [camera.fx, camera.fy, camera.cx, camera.cy, *obj_from_cam.R.ravel(), *obj_from_cam.t]
-    up = [dr.opaque(mi.Float, float(value)) for value in numbers]
-    return DeviceCamera(device_lens(mi, dr, camera.lens, camera.coefficients), up[:2], up[2:4], up[4:13], up[13:])
+    scalars = [dr.opaque(mi.Float, float(value)) for value in numbers]
+    law = device_lens(camera.lens, camera.coefficients)
+    return DeviceCamera(law, scalars[:2], scalars[2:4], scalars[4:13], scalars[13:])

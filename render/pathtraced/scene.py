@@ -6,24 +6,25 @@ Our own pictures need no scene (`render.analytic.integrate`); the reference and 
 from __future__ import annotations
 
 import functools
-from typing import Any
+from typing import Any  # Any: Mitsuba describes a scene by dictionaries of mixed values
 
 import numpy as np
 
 from render import backend
+from render.device import DeviceScene
 from render.light import Light, reference_irradiance
-from render.targets.chessboard import Target
+from render.targets.chessboard import Chessboard
 
 
 @functools.lru_cache(maxsize=4)
-def bare_scene(target: Target) -> Any:
+def bare_scene(target: Chessboard) -> DeviceScene:
     """The target's shapes and reflectance without any light, for rays that only ask what they hit."""
     mi = backend.load()
-    return mi.load_dict({"type": "scene", "board": _board(mi, target), "circle": _circle(mi, target)})
+    return mi.load_dict({"type": "scene", "board": _board(target), "circle": _circle(target)})
 
 
 @functools.lru_cache(maxsize=4)
-def reference_scene(target: Target, light: Light) -> Any:
+def reference_scene(target: Chessboard, light: Light) -> DeviceScene:
     """The same board under a real lamp and a real surrounding, for Mitsuba's own integrator: the oracle."""
     mi = backend.load()
     corners = light.lamp_corners(target)
@@ -38,8 +39,8 @@ def reference_scene(target: Target, light: Light) -> Any:
         {
             "type": "scene",
             "integrator": {"type": "direct", "emitter_samples": 4, "bsdf_samples": 0, "hide_emitters": True},
-            "board": _board(mi, target),
-            "circle": _circle(mi, target),
+            "board": _board(target),
+            "circle": _circle(target),
             "lamp": {
                 "type": "rectangle",
                 "to_world": mi.ScalarTransform4f(frame),
@@ -50,14 +51,15 @@ def reference_scene(target: Target, light: Light) -> Any:
     )
 
 
-def radiances(target: Target, light: Light) -> tuple[float, float]:
+def radiances(target: Chessboard, light: Light) -> tuple[float, float]:
     """Radiance of the lamp and of the surrounding that give the board's white at its centre radiance 1."""
     lamp, ambient = reference_irradiance(target, light)
     lamp_radiance = (1.0 - light.ambient_share) * np.pi / target.white / lamp
     return float(lamp_radiance), light.ambient_share / target.white / ambient
 
 
-def _board(mi: Any, target: Target) -> dict[str, Any]:
+def _board(target: Chessboard) -> dict[str, Any]:
+    mi = backend.load()
     x0, x1, y0, y1 = target.extent_mm
     transform = mi.ScalarTransform4f
     centre = [(x0 + x1) / 2.0, (y0 + y1) / 2.0, 0.0]
@@ -84,8 +86,8 @@ def _board(mi: Any, target: Target) -> dict[str, Any]:
     }
 
 
-def _circle(mi: Any, target: Target) -> dict[str, Any]:
-    transform = mi.ScalarTransform4f
+def _circle(target: Chessboard) -> dict[str, Any]:
+    transform = backend.load().ScalarTransform4f
     radius = target.circle_radius_mm
     return {
         "type": "disk",

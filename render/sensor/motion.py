@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from eposit import Camera, Pose
 from eposit.arrays import Array
 from eposit.pose import rotation_from_vector
-from render.region import Region
-from render.targets.chessboard import Target
+from render.targets import Target
+from render.targets.image_region import Region
 
 STEP_PX = 16  # between the pixels where the motion is computed; it is bilinear between them
 
 
 @dataclass(frozen=True, slots=True)
-class Rate:
+class PoseRate:
     """Time derivative of a pose cam_from_obj."""
 
     velocity_mm_per_s: Array  # (3,) of the object frame's origin, camera axes
@@ -29,51 +29,59 @@ class Rate:
         return Pose(turn @ pose.R, pose.t + self.velocity_mm_per_s * seconds)
 
     @staticmethod
-    def about(pose: Pose, point_in_obj: Array, velocity_mm_per_s: Array, turn_rad_per_s: Array) -> Rate:
+    def about(pose: Pose, point_in_obj: Array, velocity_mm_per_s: Array, turn_rad_per_s: Array) -> PoseRate:
         """The rate at which a point of the object moves with a velocity while the object turns about it."""
         arm = -(pose.R @ point_in_obj)
-        return Rate(velocity_mm_per_s + np.cross(turn_rad_per_s, arm), turn_rad_per_s)
+        return PoseRate(velocity_mm_per_s + np.cross(turn_rad_per_s, arm), turn_rad_per_s)
 
 
-def way_at_nodes(
-    target: Target, camera: Camera, cam_from_obj: Pose, rate: Rate, seconds: float, region: Region
-) -> Array:
-    """(rows, columns, 2) way in px that pixels go during an exposure, mid-exposure at its middle.
+@dataclass(frozen=True, slots=True)
+class Exposure:
+    """A board that moves before a camera while its shutter is open."""
 
-    Every STEP_PX-th pixel of the region, from its first to beyond its last. A pixel moves as the point of the board's
-    plane that it shows; beyond the board's border as the nearest point of the border. It is a central difference, so
-    that the way there and the way back are equally long.
-    """
-    x, y, width, height = region
-    columns, rows = (np.arange(0, size + STEP_PX, STEP_PX) for size in (width, height))
-    nodes = np.stack(np.meshgrid(x + columns, y + rows), axis=-1).astype(np.float64)
-    points = _on_board(target, camera, cam_from_obj, nodes.reshape(-1, 2))
-    ends = [camera.project(rate.moved(cam_from_obj, s * seconds).apply(points)) for s in (0.5, -0.5)]
-    return np.nan_to_num(ends[0] - ends[1]).reshape(nodes.shape)  # what the lens does not see does not move
+    target: Target
+    camera: Camera
+    cam_from_obj: Pose  # at mid-exposure
+    rate: PoseRate
+    seconds: float
+
+    def displacement(self, region: Region) -> Array:
+        """(rows, columns, 2) displacement of the image from the exposure's begin to its end, px.
+
+        At every STEP_PX-th pixel of the region, from its first to beyond its last. A pixel moves as the point of the
+        board's plane that it shows; beyond the board's border as the nearest point of the border. It is a central
+        difference, so that the image moves as far before mid-exposure as after.
+        """
+        columns, rows = (np.arange(0, size + STEP_PX, STEP_PX) for size in (region.width, region.height))
+        nodes = np.stack(np.meshgrid(region.x + columns, region.y + rows), axis=-1).astype(np.float64)
+        points = self._board_points(nodes.reshape(-1, 2))
+        poses = (self.rate.moved(self.cam_from_obj, share * self.seconds) for share in (0.5, -0.5))
+        end, begin = (self.camera.project(pose.apply(points)) for pose in poses)
+        return np.nan_to_num(end - begin).reshape(nodes.shape)  # what the lens does not see does not move
+
+    def _board_points(self, pixels: Array) -> Array:
+        """(n, 3) points of the board, mm, nearest to where the rays of (n, 2) pixels meet its plane."""
+        obj_from_cam = self.cam_from_obj.inverse()
+        rays = self.camera.bearing(pixels) @ obj_from_cam.R.T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            length = -obj_from_cam.t[2] / rays[:, 2]
+            points = obj_from_cam.t[:2] + length[:, None] * rays[:, :2]
+        missed = ~(np.all(np.isfinite(points), axis=1) & (length > 0.0))
+        points[missed] = self.target.board_centre[:2]
+        x0, x1, y0, y1 = self.target.extent_mm
+        return np.column_stack((np.clip(points, (x0, y0), (x1, y1)), np.zeros(len(points))))
 
 
-def at_pixels(nodes: Array, width: int, height: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """(height, width) ways along x and along y at every pixel, bilinear between the nodes."""
+def at_pixels(displacement: Array, width: int, height: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """(height, width) displacements along x and along y of every pixel, bilinear between the nodes."""
     along_x, along_y = (
-        _between(_between(way.T, width).T, height) for way in np.moveaxis(nodes.astype(np.float32), 2, 0)
+        _interpolated(_interpolated(nodes.T, width).T, height)
+        for nodes in np.moveaxis(displacement.astype(np.float32), 2, 0)
     )
     return along_x, along_y
 
 
-def _on_board(target: Target, camera: Camera, cam_from_obj: Pose, pixels: Array) -> Array:
-    """(n, 3) points of the board, mm, nearest to where the rays of (n, 2) pixels meet its plane."""
-    obj_from_cam = cam_from_obj.inverse()
-    rays = camera.bearing(pixels) @ obj_from_cam.R.T
-    with np.errstate(divide="ignore", invalid="ignore"):
-        way = -obj_from_cam.t[2] / rays[:, 2]
-        points = obj_from_cam.t[:2] + way[:, None] * rays[:, :2]
-    missed = ~(np.all(np.isfinite(points), axis=1) & (way > 0.0))
-    points[missed] = target.board_centre[:2]
-    x0, x1, y0, y1 = target.extent_mm
-    return np.column_stack((np.clip(points, (x0, y0), (x1, y1)), np.zeros(len(points))))
-
-
-def _between(nodes: NDArray[np.float32], size: int) -> NDArray[np.float32]:
+def _interpolated(nodes: NDArray[np.float32], size: int) -> NDArray[np.float32]:
     """Linear interpolation along the first axis from every STEP_PX-th place to all of `size`."""
     index, share = np.divmod(np.arange(size), STEP_PX)
     weight = (share / STEP_PX).astype(np.float32)[:, None]

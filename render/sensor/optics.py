@@ -46,12 +46,12 @@ def vignetting_gain(width: int, height: int, loss: float) -> NDArray[np.float32]
     1 / (1 + k (r / corner)^2)^2, the cos^4 law of a lens that sees its corner at the tangent sqrt k.
     """
     k = 1.0 / np.sqrt(1.0 - loss) - 1.0
-    x, y = from_middle(width, height)
+    x, y = normalised_axes(width, height)
     return (1.0 / (1.0 + k * (x[None] ** 2 + y[:, None] ** 2)) ** 2).astype(np.float32)
 
 
-def from_middle(width: int, height: int) -> tuple[Array, Array]:
-    """(width,) and (height,) places of the pixels from the picture's middle, in units of the way to a corner pixel."""
+def normalised_axes(width: int, height: int) -> tuple[Array, Array]:
+    """(width,) and (height,) pixels' coordinates from the picture's middle, in units of the distance to a corner."""
     x, y = np.arange(width) - 0.5 * (width - 1), np.arange(height) - 0.5 * (height - 1)
     corner = max(np.hypot(x[-1], y[-1]), 1.0)
     return x / corner, y / corner

@@ -20,7 +20,7 @@ MAX_SQUARES, MAX_MARGIN = 24, 3.0  # the map of the light has 100 x 100 points i
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Target:
+class Chessboard:
     """Chessboard with a raised circle.
 
     Raises:
@@ -39,15 +39,7 @@ class Target:
     circle: Annotated[float, "reflectance of the circle"] = 0.04
 
     def __post_init__(self) -> None:
-        if not (4 <= self.columns <= MAX_SQUARES and 4 <= self.rows <= MAX_SQUARES):
-            raise ValueError(
-                f"target has {self.columns} x {self.rows} squares; each number must lie in 4 to {MAX_SQUARES}"
-            )
-        if (self.columns + self.rows) % 2 == 0:
-            raise ValueError(
-                f"target has {self.columns} x {self.rows} squares, which looks the same after half a turn; "
-                "make one number even and the other odd"
-            )
+        self._check_squares()
         for name in ("square_mm", "circle_radius_mm", "circle_height_mm"):
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"target {name} is {getattr(self, name)}; it must be above 0 mm")
@@ -56,6 +48,16 @@ class Target:
         for name in ("white", "black", "circle"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise ValueError(f"target {name} is {getattr(self, name)}; a reflectance lies in 0 to 1")
+        self._check_circle()
+
+    def _check_squares(self) -> None:
+        given = f"target has {self.columns} x {self.rows} squares"
+        if not (4 <= self.columns <= MAX_SQUARES and 4 <= self.rows <= MAX_SQUARES):
+            raise ValueError(f"{given}; each number must lie in 4 to {MAX_SQUARES}")
+        if (self.columns + self.rows) % 2 == 0:
+            raise ValueError(f"{given}, which looks the same after half a turn; make one number even and the other odd")
+
+    def _check_circle(self) -> None:
         column, row = self.circle_square
         if not (1 <= column <= self.columns and 1 <= row <= self.rows and (column + row) % 2 == 1):
             raise ValueError(
@@ -138,22 +140,6 @@ class Target:
         ]
         border = np.column_stack((np.vstack(sides), np.zeros(4 * steps)))
         return np.vstack((border, self.circle_rim(steps)))
-
-    def edges(self, steps: int = 33) -> list[Array]:
-        """Lines (n, 3), mm, where the target's brightness jumps: borders of squares and board, the circle's rim."""
-        x0, x1, y0, y1 = self.extent_mm
-        s = np.linspace(0.0, 1.0, steps)
-        left, top = -self.square_mm, -self.square_mm
-        right, bottom = left + self.columns * self.square_mm, top + self.rows * self.square_mm
-        upright = [(left + i * self.square_mm, top, bottom) for i in range(self.columns + 1)] + [
-            (x0, y0, y1),
-            (x1, y0, y1),
-        ]
-        level = [(top + i * self.square_mm, left, right) for i in range(self.rows + 1)] + [(y0, x0, x1), (y1, x0, x1)]
-        lines = [np.stack((np.full(steps, x), a + (b - a) * s, 0.0 * s), axis=1) for x, a, b in upright]
-        lines += [np.stack((a + (b - a) * s, np.full(steps, y), 0.0 * s), axis=1) for y, a, b in level]
-        rim = self.circle_rim()
-        return [*lines, np.vstack((rim, rim[:1]))]
 
     def circle_rim(self, steps: int = 256) -> Array:
         """(steps, 3) points on the circle's rim, mm."""

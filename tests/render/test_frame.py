@@ -11,14 +11,15 @@ from eposit import Camera, Pose
 from eposit.pose import rotation_from_euler
 from render import backend
 from render.analytic.image_circle import lens_coverage
-from render.frame import render_frame
-from render.light import Light, lamp_irradiance
+from render.frame import render_frame, render_reference
+from render.light import Light
 from render.region import target_region
 from render.sensor.develop import SensorModel, develop
-from render.targets.chessboard import Target
+from render.targets.chessboard import Chessboard
 from render.targets.disc_shade import blocked_share
+from render.targets.image_region import Region
 
-TARGET, LIGHT = Target(), Light()
+TARGET, LIGHT = Chessboard(), Light()
 CAMERA = Camera(lens="orthogonal", fx=180.0, fy=180.5, cx=201.3, cy=149.2, width=400, height=300)
 
 
@@ -33,7 +34,7 @@ def test_region_has_the_bits_of_the_whole_picture(camera):
     part = render_frame(TARGET, LIGHT, camera, pose(), samples=16)
     assert part.region == region
     assert region[2] * region[3] < 0.8 * camera.width * camera.height
-    whole = render_frame(TARGET, LIGHT, camera, pose(), samples=16, region=(0, 0, camera.width, camera.height))
+    whole = render_frame(TARGET, LIGHT, camera, pose(), samples=16, region=Region.whole(camera.width, camera.height))
     np.testing.assert_array_equal(part.full(camera), whole.radiance)
 
 
@@ -53,10 +54,9 @@ def test_standard_cells_give_the_mean_of_the_pixel(lens, focal, tilt, depth):
     # Eight times the resolution: its pixels are parts of ours, and all of its edges are its own.
     cx, cy = (8.0 * c + 3.5 for c in (camera.cx, camera.cy))
     fine_camera = camera.replace(fx=8 * camera.fx, fy=8 * camera.fy, cx=cx, cy=cy, width=3200, height=2400)
-    x, y, width, height = ours.region
-    region = (8 * x, 8 * y, 8 * width, 8 * height)
+    region = Region(*(8 * value for value in ours.region))
     fine = render_frame(TARGET, LIGHT, fine_camera, pose(tilt, depth), samples=64, region=region)
-    mean = fine.radiance.reshape(height, 8, width, 8).mean(axis=(1, 3), dtype=np.float64)
+    mean = fine.radiance.reshape(ours.region.height, 8, ours.region.width, 8).mean(axis=(1, 3), dtype=np.float64)
     grey = 255.0 * 0.8 * np.abs(ours.radiance - mean)
     # Where edges meet within a cell of 1/64 pixel, their product may be wrong by a third of it: 0.3 / 64 of 150 grey
     # levels in each such cell, of which a pixel of a steep board has two or three. A missed edge shows as 10 and more.
@@ -66,7 +66,7 @@ def test_standard_cells_give_the_mean_of_the_pixel(lens, focal, tilt, depth):
 
 def test_looked_up_light_is_mitsubas_light():
     ours = render_frame(TARGET, LIGHT, CAMERA, pose(), samples=64)
-    theirs = render_frame(TARGET, LIGHT, CAMERA, pose(), samples=256, seed=2, reference=True)
+    theirs = render_reference(TARGET, LIGHT, CAMERA, pose(), samples=256, seed=2)
     difference = 255.0 * 0.8 * (ours.radiance - theirs.radiance)
     # 256 x 4 lamp samples leave 0.7 grey levels in a white pixel, more at an edge, and 0.005 in the mean of 25000.
     assert abs(difference.mean()) < 0.03
@@ -90,7 +90,7 @@ def test_developed_picture_is_that_of_4096_path_traced_rays(lens, focal, tilt, d
     """No pixel off by more than one grey level, and the mean by less than 0.05."""
     camera = CAMERA.replace(lens=lens, fx=focal, fy=focal + 0.5)
     ours = render_frame(TARGET, LIGHT, camera, pose(tilt, depth), samples=64)
-    theirs = render_frame(TARGET, LIGHT, camera, pose(tilt, depth), samples=4096, seed=2, reference=True)
+    theirs = render_reference(TARGET, LIGHT, camera, pose(tilt, depth), samples=4096, seed=2)
     a, b = (develop(master.full(camera), SensorModel()).astype(int) for master in (ours, theirs))
     linear = 255.0 * 0.8 * (ours.radiance - theirs.radiance)
     worst = np.unravel_index(np.argmax(np.abs(linear)), linear.shape)
@@ -101,23 +101,6 @@ def test_developed_picture_is_that_of_4096_path_traced_rays(lens, focal, tilt, d
     )
     assert np.abs(a - b).max() <= 1
     assert abs(np.mean(a - b)) < 0.05
-
-
-def test_lamp_irradiance_is_the_polygon_formula():
-    """Lambert's closed form for a polygon of unit radiance, from Baum et al. 1989."""
-    points = np.array([[0.0, 0.0, 0.0], [400.0, 250.0, 0.0], [900.0, 600.0, 0.0]])
-    found = lamp_irradiance(TARGET, LIGHT, points, 6, shadowed=False)
-    midpoint = lamp_irradiance(TARGET, LIGHT, points, 48, shadowed=True)  # the shade is elsewhere
-    for point, value, rough in zip(points, found, midpoint, strict=True):
-        corners = LIGHT.lamp_corners(TARGET) - point
-        unit = corners / np.linalg.norm(corners, axis=1, keepdims=True)
-        total = np.zeros(3)
-        for a, b in zip(unit, np.roll(unit, -1, axis=0), strict=True):
-            cross = np.cross(a, b)
-            total += np.arccos(a @ b) * cross / np.linalg.norm(cross)
-        assert value == pytest.approx(abs(0.5 * total @ [0, 0, -1]), rel=1e-11)  # six Gauss nodes on 0.31 rad
-        # Midpoint rule, 48^2 points on 0.31 rad: (0.31 / 48)^2 / 24 times the bend of cos^4 on both axes, 8: 1.4e-5.
-        assert rough == pytest.approx(abs(0.5 * total @ [0, 0, -1]), rel=3e-5)
 
 
 def test_blocked_share_far_and_below():

@@ -29,14 +29,15 @@ from pipelines.bench.table import Figure, Row, compared
 from pipelines.bench.timing import Times, in_turn, mean_of
 from render import backend
 from render.frame import LinearImage
-from render.region import Image, Region, target_region
+from render.region import Image, target_region
+from render.targets.image_region import Region
 
 PART = "blender"
 SAMPLES = 64
 IN_A_ROW = 20  # frames of ours against one of Blender's, which takes seconds
 VARIABLE = "EPOSIT_BLENDER"
 SCRIPT = Path(__file__).resolve().parent / "script.py"
-NO_BPY = 3  # the script's exit code
+NO_BPY = 3  # the script's exit code; the script says it too, as Blender's Python has none of our modules
 REMEDY = "run `make bench-blender`, which makes an environment with one"
 
 

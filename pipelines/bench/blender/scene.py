@@ -12,7 +12,7 @@ from eposit import Camera, Pose
 from eposit.arrays import Array
 from render.light import Light
 from render.pathtraced.scene import radiances
-from render.targets.chessboard import Target
+from render.targets.chessboard import Chessboard
 
 LENS = "equisolid"  # the lens that Cycles and we both have
 LENS_MM = 10.5  # any focal length does, as the sensor's width is chosen to match
@@ -40,7 +40,7 @@ def description(recipe: Recipe, frame: Frame, samples: int, threads: int) -> dic
     }
 
 
-def _board(target: Target) -> dict[str, Any]:
+def _board(target: Chessboard) -> dict[str, Any]:
     """Corners, their places in the map of reflectance, and that map: a texel for a square, u along x, v along y."""
     x0, x1, y0, y1 = target.extent_mm
     corners = np.array([(x0, y0, 0.0), (x1, y0, 0.0), (x1, y1, 0.0), (x0, y1, 0.0)])
@@ -52,7 +52,7 @@ def _board(target: Target) -> dict[str, Any]:
     }
 
 
-def _lamp(target: Target, light: Light, radiance: float) -> dict[str, Any]:
+def _lamp(target: Chessboard, light: Light, radiance: float) -> dict[str, Any]:
     """A square lamp that shines along its -z; its power is that of an even radiance into the half space.
 
     Cycles lets the surrounding shine through its lamps, which makes the demo's board 0.8 % brighter than ours.

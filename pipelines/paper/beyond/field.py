@@ -13,7 +13,7 @@ from eposit import Camera, Pose, Solution
 from eposit.arrays import Array, Mask
 from pipelines.adapters.registry import find_solver
 from pipelines.paper.claims import PaperSection
-from pipelines.paper.problems import OBJECT, SIGMA_PX, at_field_angle, bounds, errors_of, information, noisy
+from pipelines.paper.problems import EXACT_RAD, OBJECT, SIGMA_PX, at_field_angle, bounds, errors_of, information, noisy
 from pipelines.report.sections import Drawing, Table
 from pipelines.report.svg import STYLE, svg
 from pipelines.statistics import Interval, percent, wilson
@@ -23,7 +23,6 @@ SOLVERS = ("posit", "eposit", "centred", "best", "opencv-sqpnp")
 LINEAR = ("posit", "eposit", "centred")
 UNDER = ("posit", "centred")  # drawn wide: the next curve lies on them
 ITERATIONS = 500  # of a linear method; what takes longer lies at its limit
-EXACT_RAD = 1e-6
 NOISY_BOUNDS = 5.0
 LIMIT_DEG = float(np.rad2deg(np.arctan(np.sqrt(2.0))))
 # Sees 180 degrees all round; the picture is large enough for all that is asked.

@@ -14,7 +14,7 @@ from pipelines.paper.claims import PaperSection
 from pipelines.paper.problems import SIGMA_PX, bounds, camera_with, errors_of, information, noisy
 from pipelines.report.sections import Table
 from pipelines.statistics import percent, wilson
-from render.targets.chessboard import Target
+from render.targets.chessboard import Chessboard
 
 MOVED_PX = (5.0, 500.0)  # logarithmically even
 WITHIN = 5.0  # bounds of the pose from the right points
@@ -46,7 +46,7 @@ def robustness(trials: int = 60, seed: int = 6) -> PaperSection:
         for n, chosen in POINTS.items():
             for spoil in SPOILS:
                 for sigma in (SIGMA_PX, None):
-                    cells = _trial(lens, Target().points[list(chosen)], spoil, sigma, trials, seed)
+                    cells = _trial(lens, Chessboard().points[list(chosen)], spoil, sigma, trials, seed)
                     rows.append((camera, str(n), spoil, "known" if sigma else "not known", *cells))
     note = (
         f"{trials} trials a row: the board's corners and circle at about 2 m, noise of {SIGMA_PX:g} px. Recovered: no "

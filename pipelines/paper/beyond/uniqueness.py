@@ -10,7 +10,7 @@ from eposit.pose import rotation_error_rad
 from eposit.posit.iteration import posit
 from eposit.posit.orthography import Orthography
 from pipelines.paper.claims import PaperSection, Statement, Verdict, holds_if
-from pipelines.paper.problems import OBJECT, SIDE_MM, at_angles, helix, turned
+from pipelines.paper.problems import EXACT_RAD, OBJECT, SIDE_MM, at_angles, helix, turned
 from pipelines.report.sections import Table
 from pipelines.statistics import percent, wilson
 
@@ -20,7 +20,6 @@ SIZES = (0.1, 0.3, 0.6)  # reach of random objects over their distance
 CONDITION = 20.0  # of a random object's offsets: neither flat nor long
 STARTS = 8
 STEPS = 300
-EXACT_RAD = 1e-6
 HEAD = (
     "problems", "how many", "one fixed point, proved", "iteration ends in the pose", "ends elsewhere", "does not end",
     f"another fixed point from {STARTS} random starts",

@@ -18,7 +18,7 @@ from eposit import Camera, Pose, Solution, Status
 from eposit.arrays import Array, Mask
 from eposit.pose import euler_error_rad, rotation_error_rad
 from pipelines.paper.experiment.calibration import STAGED, Calibration, calibrate
-from render.targets.chessboard import Target
+from render.targets.chessboard import Chessboard
 
 HARD = {11: "steep tilt", 13: "out of focus", 22: "field's edge"}  # by the picture's number, from 1; the paper's too
 LEAST_POINTS = 4
@@ -29,7 +29,7 @@ STEPS = 2000  # of the released code
 class Pictures:
     """What is known of b pictures of one camera."""
 
-    target: Target
+    target: Chessboard
     four: list[int]  # rows of the target's points
     true: Camera
     nominal: Camera

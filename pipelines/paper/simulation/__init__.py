@@ -14,13 +14,12 @@ from eposit import Camera, Pose, Solution, Status, gpnpf, opnp, pnpfr, released
 from eposit.arrays import Array, Mask
 from eposit.pose import euler_error_rad
 from pipelines.adapters.registry import find_solver
-from pipelines.paper.problems import OBJECT, SIGMA_PX, camera_with, errors_of, helix
-from pipelines.stages.score import GROSS_FAILURE_FACTOR
+from pipelines.paper.problems import OBJECT, SIGMA_PX, camera_with, errors_of, helix, nominal_camera_with, taken
+from pipelines.stages.score import is_gross_failure
 from pipelines.statistics import Interval, bootstrap, mean
 
 LENSES = ("perspective", "stereographic", "equidistance", "equisolid", "orthogonal")
 FISHEYES = LENSES[1:]
-NOMINAL_PX = {"perspective": 1353.0} | dict.fromkeys(FISHEYES, 541.0)
 CENTRE_PX = (800.0, 600.0)  # of the image, which the paper measures theta from
 COMPONENTS = ("rx", "ry", "rz", "x", "y", "z")
 UNITS = ("deg", "deg", "deg", "mm", "mm", "mm")
@@ -43,8 +42,7 @@ class Draws:
     @property
     def nominal(self) -> Camera:
         """Nominal focal length and image centre: a user without calibration."""
-        f = NOMINAL_PX[self.lens]
-        return self.camera.replace(fx=f, fy=f, cx=CENTRE_PX[0], cy=CENTRE_PX[1])
+        return nominal_camera_with(self.lens)
 
     @property
     def paper(self) -> Camera:
@@ -69,8 +67,8 @@ def draws(lens: str, seeds: int, sigma_px: float = SIGMA_PX, path: Pose | None =
     own = () if shared else (1 + LENSES.index(lens),)
     noise = [np.random.default_rng((seed, *own)).standard_normal(exact.shape) for seed in range(seeds)]
     pixels = np.concatenate([exact + sigma_px * part for part in noise])
-    order = np.arange(seeds * len(pose.t)).reshape(seeds, -1) % len(pose.t)
-    return Draws(lens, camera, Pose(pose.R[order.ravel()], pose.t[order.ravel()]), pixels, seeds)
+    order = np.arange(seeds * len(pose.t)) % len(pose.t)
+    return Draws(lens, camera, taken(pose, order), pixels, seeds)
 
 
 def outcome(problem: Draws, estimate: Estimate) -> Outcome:
@@ -79,9 +77,7 @@ def outcome(problem: Draws, estimate: Estimate) -> Outcome:
     failed = np.asarray(solution.status) != Status.OK
     angles = np.degrees(euler_error_rad(solution.cam_from_obj.R, problem.pose.R))
     shift = solution.cam_from_obj.t - problem.pose.t
-    length = np.linalg.norm(solution.cam_from_obj.t, axis=1)
-    with np.errstate(invalid="ignore"):
-        gross = failed | (length >= GROSS_FAILURE_FACTOR * np.linalg.norm(problem.pose.t, axis=1))
+    gross = is_gross_failure(failed, solution.cam_from_obj.t, problem.pose.t)
     error = np.where(failed[:, None], np.nan, np.hstack((angles, shift)))
     shape = (problem.seeds, -1)
     return Outcome(

@@ -12,10 +12,9 @@ from eposit import Pose, Solution, released
 from eposit.arrays import Array
 from pipelines.paper import simulation as sim
 from pipelines.paper.claims import PaperSection
-from pipelines.paper.problems import OBJECT, stacked
+from pipelines.paper.problems import OBJECT, poses_on
 from pipelines.report.sections import Table
 from pipelines.statistics import bootstrap, mean
-from render.targets.chessboard import Target
 
 LENSES = ("perspective", "equidistance", "orthogonal")
 HEAD = (
@@ -49,19 +48,14 @@ def _variants() -> list[tuple[str, str, Pose | None, bool, tuple[sim.Estimate, s
     principal = (sim.equations_from_principal_point, sim.as_released_from_principal_point)
     return [
         ("none", "our reading", None, True, principal),
-        ("range of t", "0 to 90 s", _path(stop=90.0), True, principal),
-        ("step of t", "5 s", _path(step=5.0), True, principal),
-        ("start angles", "0 degrees", _path(angle_deg=(0.0, 0.0, 0.0)), True, principal),
+        ("range of t", "0 to 90 s", poses_on(Helix(point="origin", stop=90.0)), True, principal),
+        ("step of t", "5 s", poses_on(Helix(point="origin", step=5.0)), True, principal),
+        ("start angles", "0 degrees", poses_on(Helix(point="origin", angle_deg=(0.0, 0.0, 0.0))), True, principal),
         ("shared noise", "each lens its own", None, False, principal),
         ("theta", "from the image centre", None, True, (sim.equations, sim.as_released)),
         ("camera", "image centre everywhere", None, True, (_with("eposit", "nominal"), _with("released", "nominal"))),
         ("camera", "true focal length, too", None, True, (_with("eposit", "camera"), _with("released", "camera"))),
     ]
-
-
-def _path(**changes: object) -> Pose:
-    path = Helix(point="origin", **changes)  # type: ignore[arg-type]
-    return stacked([path.cam_from_obj(time, Target()) for time in path.times()])
 
 
 def _with(solver: str, camera: str) -> Callable[[sim.Draws], Solution]:

@@ -6,16 +6,20 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tomlkit import TOMLDocument
 
 from datasets.errors import UserError
 from datasets.plan import Stream, frame_count, plan, rng_for, shard_count
 from datasets.recipe.model import describe, load_recipe, parse_recipe, recipe_names, values
 from datasets.recipe.override import with_regime
 from datasets.recipe.quality import QUALITIES
+from datasets.recipe.written_out import written_out
 from datasets.schema import MEANING, TABLES, dictionary
 from datasets.trajectories.helix import Helix
 from render.sensor.presets import regimes
-from render.targets.chessboard import Target
+from render.targets.chessboard import Chessboard
+
+CAMERA = '[[cameras]]\nname = "a"\nlens = "perspective"\nfx = 300\nfy = 300\ncx = 400\ncy = 300  # px\n'
 
 
 def test_every_recipe_loads_and_plans():
@@ -49,7 +53,7 @@ def test_the_demo_is_the_papers_helix_with_five_lenses():
     [("origin", (0, 0, 0)), ("board_centre", (400, 250, 0)), ((-50.0, 50.0, -10.0), (-50, 50, -10))],
 )
 def test_the_trajectory_carries_the_point_it_names(point, carried):
-    pose = Helix(point=point).cam_from_obj(30.0, Target())
+    pose = Helix(point=point).cam_from_obj(30.0, Chessboard())
     where = pose.apply(np.array([carried], float))[0]
     expected = 100 * np.sqrt(2) * np.array([np.cos(np.deg2rad(75.0)), np.sin(np.deg2rad(75.0))])
     np.testing.assert_allclose(where, [*expected, 2007.5], atol=1e-9)
@@ -139,6 +143,25 @@ def test_a_regime_is_put_into_a_recipe_as_if_it_had_been_written(sensor):
         recipe = parse_recipe(with_regime(before, "harsh", "x"), "x")
         assert recipe.sensor == dataclasses.replace(regimes()["harsh"], gamma=gamma)
         assert recipe.model_copy(update={"sensor": regimes()["clean"]}).digest() == load_recipe("smoke")[0].digest()
+
+
+def test_comments_stay_when_a_regime_is_put_in():
+    for sensor in ("", "[sensor]  # dark\n# how dark\ngamma = 2.2  # bright\n", "sensor = { gamma = 2.2 }  # short\n"):
+        top, rest = (sensor, "") if "{" in sensor else ("", sensor)
+        text = f'# on top\nname = "x"  # its name\n{top}{rest}\n# a lens\n{CAMERA}# at the end\n'
+        changed = with_regime(text, "harsh", "x")
+        assert parse_recipe(changed, "x").sensor.exposure == regimes()["harsh"].exposure
+        assert [line for line in text.splitlines() if line not in changed and "{" not in line] == []
+        assert changed.count("#") == text.count("#")
+
+
+@pytest.mark.parametrize(
+    "write", [lambda text: with_regime(text, "harsh", "mine"), lambda text: written_out(text, "mine")]
+)
+def test_a_text_that_cannot_be_edited_is_refused(write, monkeypatch):
+    monkeypatch.setattr("tomlkit.parse", lambda text: TOMLDocument())
+    with pytest.raises(UserError, match=r"cannot .* mine; (write|give) "):
+        write('name = "x"\ncameras = "paper"\n')
 
 
 def test_a_regime_is_the_default_of_keys_that_are_left_out():

@@ -12,9 +12,9 @@ from datasets.trajectories.field import FieldAngles
 from datasets.trajectories.helix import Helix
 from datasets.trajectories.scatter import Scatter
 from eposit.pose import rotation_error_rad, rotation_error_vector, tilt_rad
-from render.targets.chessboard import Target
+from render.targets.chessboard import Chessboard
 
-TARGET = Target()
+TARGET = Chessboard()
 BASE = """\
 name = "x"
 [[cameras]]

@@ -10,10 +10,11 @@ from pipelines.bench.cases import scaled
 from pipelines.bench.command import parts
 from pipelines.bench.primary_rays import RAYS, primary_rays
 from pipelines.bench.scaling import exponent
-from pipelines.bench.solvers import CAMERA, POINTS, draws, solvers
+from pipelines.bench.solvers import draws, solvers
 from pipelines.bench.table import TITLES, compared, markdown
 from pipelines.bench.timing import Times, in_turn, total
 from pipelines.machine import LIBRARIES, facts
+from pipelines.paper.problems import OBJECT, camera_with
 from render.region import target_region
 
 
@@ -79,14 +80,14 @@ def test_an_unknown_part_is_a_sentence(cli):
 
 
 def test_solvers_are_measured_on_the_papers_draws():
-    pixels = draws(722)
+    camera, pixels = camera_with("perspective"), draws(722)
     assert pixels.shape == (722, 4, 2)
     # Two rounds of the helix differ by noise alone: 0.4 px sqrt 2, good to 0.0074 over
     # 2888 differences; five of those.
     assert (pixels[361:] - pixels[:361]).std() == pytest.approx(0.566, abs=0.037)
     focal = {"gpnpf", "pnpfr", "opencv-epnp", "poselib-p4pf"}  # no pose, or none of use, on some of these draws
     for solver in solvers():
-        found = solver.call(POINTS, pixels[:361], CAMERA)
+        found = solver.call(OBJECT, pixels[:361], camera)
         if solver.name in focal:
             assert np.mean(np.asarray(found.status) == "ok") > 0.9
             continue
@@ -94,5 +95,5 @@ def test_solvers_are_measured_on_the_papers_draws():
         # A helix of radius 141 mm from 2000 to 2090 mm; POSIT's noise in depth is 14 mm.
         depth = found.cam_from_obj.t[:, 2] - np.linspace(2000.0, 2090.0, 361)
         assert abs(np.median(depth)) < 5.0
-        assert solver.call(POINTS, pixels[0], CAMERA).status == "ok"
+        assert solver.call(OBJECT, pixels[0], camera).status == "ok"
     assert {f"solve {name}" for name in eposit.METHODS} < {solver.name for solver in solvers()}

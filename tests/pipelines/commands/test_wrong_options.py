@@ -9,8 +9,8 @@ from tests.wrong_input import assert_refused, estimate, on_dataset
 CASES = {
     "missing recipe": (lambda place: ("run", place.folder / "no.toml", "--out", place.new()), "cannot read recipe"),
     "recipe is a folder": (lambda place: ("run", f"{place.folder}/", "--out", place.new()), "Is a directory"),
-    "unknown recipe": (lambda place: ("run", "dmo", "--out", place.new()), "did you mean demo?"),
-    "describe an unknown recipe": (lambda place: ("describe", "smokey"), "did you mean smoke?"),
+    "unknown recipe": (lambda place: ("run", "dmo", "--out", place.new()), "(did you mean 'demo'?)"),
+    "describe an unknown recipe": (lambda place: ("describe", "smokey"), "(did you mean 'smoke'?)"),
     "unknown solver": (estimate("--solver", "upnp"), "unknown solver 'upnp'; choose one of best"),
     "four points for all": (estimate("--solver", "poselib-p3p"), "solver poselib-p3p takes exactly four points; add"),
     "unknown camera": (estimate("--camera", "wide"), "unknown camera 'wide'; choose one of exact"),

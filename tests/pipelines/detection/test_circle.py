@@ -6,10 +6,10 @@ from scipy.spatial.transform import Rotation
 
 from pipelines.detection.board_map import BoardMap, grid
 from pipelines.detection.circle import find_circle
-from render.targets.chessboard import Target
+from render.targets.chessboard import Chessboard
 from tests.supersampled import digitised, picture
 
-TARGET = Target()  # all lengths below in its squares
+TARGET = Chessboard()  # all lengths below in its squares
 AT, RADIUS, HEIGHT = np.array([-0.5, 0.5]), 0.3, 0.1
 WIDTH, TALL = 640, 480
 WHITE, BLACK, DISC = 200.0, 15.0, 10.0  # grey values

@@ -7,10 +7,10 @@ import pytest
 from pipelines.detection import Detector, detect_points
 from pipelines.detection.board_map import grid
 from pipelines.detection.finders import FINDERS, find_board, find_sector_based, textured_region
-from render.targets.chessboard import Target
+from render.targets.chessboard import Chessboard
 from tests.supersampled import digitised, picture
 
-TARGET = Target()
+TARGET = Chessboard()
 CORNERS = grid(TARGET.inner)
 MIDDLE = np.array([4.0, 2.5])
 WHITE, BLACK, BEHIND = 200.0, 20.0, 90.0

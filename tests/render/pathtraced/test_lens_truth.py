@@ -11,6 +11,7 @@ from eposit import LENS_NAMES, Camera, Pose
 from pipelines.stages.generate import outline_centroid
 from render import backend
 from render.pathtraced.fisheye import sensor_dict
+from render.targets.image_region import Region
 from tests.cameras import KB, RADIUS
 
 WIDTH, HEIGHT, SAMPLES = 800, 600, 256
@@ -76,7 +77,7 @@ def render_dots(camera):
         }
         assert abs(np.linalg.norm(a) - np.linalg.norm(b)) < 1e-9
     pose = Pose(np.eye(3), np.zeros(3))
-    sensor = mi.load_dict(sensor_dict(camera, pose, (0, 0, WIDTH, HEIGHT), SAMPLES))
+    sensor = mi.load_dict(sensor_dict(camera, pose, Region.whole(WIDTH, HEIGHT), SAMPLES))
     return np.array(mi.render(mi.load_dict(scene), sensor=sensor, spp=SAMPLES, seed=3))[..., 0]
 
 

@@ -11,18 +11,20 @@ from eposit import Camera, Pose
 from eposit.pose import rotation_from_euler
 from render.frame import render_frame
 from render.light import Light
-from render.sensor.develop import LEAST_MOTION_PX, SHORT_PX, FrameContext, develop
-from render.sensor.motion import Rate, at_pixels, way_at_nodes
-from render.sensor.noise import normals
+from render.sensor.develop import FrameContext, develop
+from render.sensor.motion import Exposure, PoseRate, at_pixels
+from render.sensor.motion_blur import MIN_MOTION_PX, SHORT_MOTION_PX
+from render.sensor.noise import standard_normals
 from render.sensor.optics import disc_kernel, vignetting_gain
 from render.sensor.presets import SensorModel, regime_of, regimes
-from render.targets.chessboard import Target
+from render.targets.chessboard import Chessboard
+from render.targets.image_region import Region
 
-TARGET = Target()
+TARGET = Chessboard()
 CAMERA = Camera(lens="perspective", fx=400.0, fy=400.0, cx=199.5, cy=149.5, width=400, height=300)
 FACING = Pose(np.eye(3), np.array([0.0, 0.0, 2000.0]) - TARGET.board_centre)
-STILL = Rate(np.zeros(3), np.zeros(3))
-WHOLE = (0, 0, CAMERA.width, CAMERA.height)
+STILL = PoseRate(np.zeros(3), np.zeros(3))
+WHOLE = Region.whole(CAMERA.width, CAMERA.height)
 BARE = SensorModel(exposure=1.0, psf_sigma_px=0.0)
 
 
@@ -109,7 +111,7 @@ def test_noise_has_the_mean_and_variance_of_electrons(signal):
 
 
 def test_the_noise_is_gaussian():
-    z = normals(1_000_003, np.random.SFC64(5))
+    z = standard_normals(1_000_003, np.random.SFC64(5))
     assert z.dtype == np.float32
     assert len(z) == 1_000_003
     assert kstest(z, norm.cdf).pvalue > 0.01
@@ -137,7 +139,7 @@ def blurred_edge(x, way, sigma):
 def test_motion_is_an_even_way_about_the_middle(way):
     """An edge goes `way` px while the board moves; it widens by the closed form and stays where it is."""
     sigma, place = 1.0, 199.5 + 0.27
-    rate = Rate(np.array([way * 2000.0 / 400.0 / 0.01, 0.0, 0.0]), np.zeros(3))  # px to mm at 2 m, in 10 ms
+    rate = PoseRate(np.array([way * 2000.0 / 400.0 / 0.01, 0.0, 0.0]), np.zeros(3))  # px to mm at 2 m, in 10 ms
     x = np.arange(400) - place
     light = np.tile(norm.cdf(x / sigma), (300, 1)).astype(np.float32)
     model = dataclasses.replace(BARE, exposure_s=0.01)
@@ -145,7 +147,7 @@ def test_motion_is_an_even_way_about_the_middle(way):
     expected = 255.0 * blurred_edge(x, way, sigma)
     near = np.abs(x) < 30
     # Half a grey level of rounding; the nine weights of short ways are within 0.2 and Lanczos within 0.3 of the truth.
-    assert np.abs(grey - expected)[near].max() < (0.75 if way <= SHORT_PX else 0.85)
+    assert np.abs(grey - expected)[near].max() < (0.75 if way <= SHORT_MOTION_PX else 0.85)
     # The middle of the edge from its moment: 60 roundings of 0.3 px shift it by 0.3 sqrt(60) / 255 = 0.009.
     assert np.sum(grey[near] - 255.0 * (x[near] > 0)) / 255.0 == pytest.approx(
         np.sum(expected[near] - 255.0 * (x[near] > 0)) / 255.0, abs=0.02
@@ -162,7 +164,7 @@ def test_only_motion_across_an_edge_blurs_it(way, along):
     velocity = np.append(aside if along else across, 0.0) * way * 5.0 / 0.01
     model = dataclasses.replace(BARE, exposure_s=0.01)
     light = norm.cdf(distance).astype(np.float32)
-    grey = develop(light, model, shot(rate=Rate(velocity, np.zeros(3)))).astype(float)
+    grey = develop(light, model, shot(rate=PoseRate(velocity, np.zeros(3)))).astype(float)
     expected = 255.0 * blurred_edge(distance, 0.0 if along else way, 1.0)
     error = (grey - expected)[(np.abs(distance) < 2.0) & (np.abs(y) < 60)]
     # Half a level of rounding. OpenCV rounds places to 1/32 px, by up to 1/64 px, where the edge rises 100 levels a px;
@@ -170,12 +172,12 @@ def test_only_motion_across_an_edge_blurs_it(way, along):
     assert np.abs(error).max() < 1.0
     # Rounding alone is 0.29, that of the places adds as much again. In short ways the wrong diagonal would add half the
     # variance, way^2 / 24, times the bend of the edge, up to 62 grey levels per px^2: 0.5 at the least.
-    assert np.sqrt(np.mean(error**2)) < (0.36 if way <= SHORT_PX else 0.45)
+    assert np.sqrt(np.mean(error**2)) < (0.36 if way <= SHORT_MOTION_PX else 0.45)
 
 
 def test_a_way_too_short_to_be_seen_changes_nothing():
     light = np.random.default_rng(0).uniform(0.0, 1.0, (300, 400)).astype(np.float32)
-    rate = Rate(np.array([0.9 * LEAST_MOTION_PX * 5.0 / 0.01, 0.0, 0.0]), np.zeros(3))
+    rate = PoseRate(np.array([0.9 * MIN_MOTION_PX * 5.0 / 0.01, 0.0, 0.0]), np.zeros(3))
     model = dataclasses.replace(BARE, exposure_s=0.01)
     np.testing.assert_array_equal(develop(light, model, shot(rate=rate)), develop(light, BARE))
 
@@ -185,8 +187,8 @@ def test_the_way_of_a_pixel_is_that_of_the_board(lens):
     camera = CAMERA.replace(lens=lens, fx=180.0, fy=181.0)
     R = rotation_from_euler(np.deg2rad([30.0, 20.0, 15.0]))
     pose = Pose(R, np.array([50.0, -30.0, 1300.0]) - R @ TARGET.board_centre)
-    rate = Rate(np.array([90.0, -60.0, 120.0]), np.array([0.2, -0.4, 0.5]))
-    way_x, way_y = at_pixels(way_at_nodes(TARGET, camera, pose, rate, 0.05, WHOLE), 400, 300)
+    rate = PoseRate(np.array([90.0, -60.0, 120.0]), np.array([0.2, -0.4, 0.5]))
+    way_x, way_y = at_pixels(Exposure(TARGET, camera, pose, rate, 0.05).displacement(WHOLE), 400, 300)
     ends = [camera.project(rate.moved(pose, s).apply(TARGET.corners)) for s in (0.025, -0.025)]
     pixels = np.rint(camera.project(pose.apply(TARGET.corners))).astype(int)
     found = np.stack((way_x, way_y), axis=-1)[pixels[:, 1], pixels[:, 0]]
@@ -200,12 +202,12 @@ def test_the_blur_is_the_mean_of_renders_on_the_way():
     camera = CAMERA.replace(lens="equidistance", fx=190.0, fy=190.0)
     R = rotation_from_euler(np.deg2rad([25.0, -20.0, 10.0]))
     pose = Pose(R, np.array([30.0, 20.0, 1200.0]) - R @ TARGET.board_centre)
-    rate = Rate.about(pose, TARGET.board_centre, np.array([500.0, 200.0, 300.0]), np.array([0.0, 0.5, 1.5]))
+    rate = PoseRate.about(pose, TARGET.board_centre, np.array([500.0, 200.0, 300.0]), np.array([0.0, 0.5, 1.5]))
     model = SensorModel(exposure_s=0.04)
     moments = (np.arange(16) + 0.5) / 16.0 - 0.5
 
     def light(at, samples):
-        return render_frame(TARGET, Light(), camera, at, samples=samples, seed=1).full(camera)
+        return render_frame(TARGET, Light(), camera, at, samples=samples).full(camera)
 
     mean = np.mean([light(rate.moved(pose, s * 0.04), 64) for s in moments], axis=0, dtype=np.float64)
     expected = develop(mean.astype(np.float32), SensorModel()).astype(float)
