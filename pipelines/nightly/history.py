@@ -138,7 +138,7 @@ class History:
 def _read(path: Path, schema: pa.Schema | None = None) -> pa.Table:
     advice = "move it away, or restore it from a backup"
     try:
-        table = pq.read_table(path, partitioning=None)
+        table = pq.ParquetFile(path).read()
     except FileNotFoundError:
         raise UserError(f"{path} is missing; {advice}") from None
     except (OSError, pa.ArrowException) as error:

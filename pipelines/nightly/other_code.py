@@ -22,8 +22,8 @@ KEPT = (".py", ".toml", ".html", ".json", ".typed")
 ROOT = Path(__file__).resolve().parents[2]
 LAST_LINES = 3  # of what a failed process said
 
-# argv: the folder of the code, the packages that it must hold, then the words of the command.
-PROGRAM = """
+# argv: the folder of the code, the packages that it must hold, then what the program wants.
+CHOOSE_CODE = """
 import importlib, sys
 from pathlib import Path
 folder, packages = Path(sys.argv[1]).resolve(), sys.argv[2].split(",")
@@ -32,10 +32,15 @@ for name in packages:
     found = Path(importlib.import_module(name).__file__).resolve()
     if not found.is_relative_to(folder):
         sys.exit(f"{name} is {found}, not in {folder}")
+"""
+RUN_COMMAND = (
+    CHOOSE_CODE
+    + """
 from pipelines.__main__ import main
 sys.argv = ["pipelines", *sys.argv[3:]]
 sys.exit(main())
 """
+)
 
 
 class OtherCodeError(Exception):
@@ -57,7 +62,7 @@ class Code:
         Raises:
             OtherCodeError: it failed, or another `eposit` answered.
         """
-        command = [sys.executable, "-c", PROGRAM, self.folder, ",".join(self.packages), *words]
+        command = [sys.executable, "-c", RUN_COMMAND, self.folder, ",".join(self.packages), *words]
         done = subprocess.run(
             list(map(str, command)),
             cwd=functions,

@@ -1,7 +1,7 @@
 """The pictures of a night. Pinned ones are made once and kept; fresh ones have tonight's seed.
 
-Both are a dataset for each sensor regime. Whoever reads them, the candidate or the baseline's code, works on a folder of
-its own that shares the pictures and their truth with the suite.
+Both are a dataset for each sensor regime. Whoever reads them, the candidate or the baseline's code, works on a folder
+of its own that shares the pictures and their truth with the suite.
 """
 
 from __future__ import annotations
@@ -138,13 +138,15 @@ def _digest(parts: Sequence[str]) -> str:
 
 
 def pictures_digest(dataset: Dataset) -> str:
-    """Hash of the decoded content of a dataset's pictures and their truth."""
-    tables = [
-        table_digest(dataset.read_shard(path)) for name in ("frames", "keypoints") for path in dataset.shards(name)
-    ]
-    if not tables:
+    """Hash of the decoded content of a dataset's pictures and their truth.
+
+    Raises:
+        UserError: it has none, or a shard is damaged.
+    """
+    paths = [path for table in ("frames", "keypoints") for path in dataset.shards(table)]
+    if not paths:
         raise UserError(f"{dataset.root} holds no pictures; delete it, and the next night makes them again")
-    return _digest(tables)
+    return _digest([table_digest(dataset.read_shard(path)) for path in paths])
 
 
 def small(suite: Suite, frames: int) -> Suite:

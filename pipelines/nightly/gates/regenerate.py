@@ -64,8 +64,8 @@ def judge(again: list[Again], same_machine: bool) -> Outcome:
     if other:
         worst = max(other, key=lambda item: (item.grey_levels, item.points_px))
         told = (
-            f"{len(other)} of {len(again)} pinned frames come out otherwise, frame {worst.frame_id} of {worst.suite} by "
-            f"{worst.grey_levels} grey levels and {worst.points_px:.2g} px"
+            f"{len(other)} of {len(again)} pinned frames come out otherwise, frame {worst.frame_id} of {worst.suite} "
+            f"by {worst.grey_levels} grey levels and {worst.points_px:.2g} px"
         )
         frames = tuple((item.suite, item.frame_id) for item in other)
         return Outcome(GATE, State.FAILED, told, Exit.NO_VERDICT, frames=frames)
