@@ -68,7 +68,7 @@ class Row:
     def change(self) -> str:
         """The effect with its 95 % interval, to the digits that the interval supports."""
         effect, low, high = (self._shown(value) for value in (self.effect, self.low, self.high))
-        step = high - low if high > low else abs(effect)
+        step = high - low if high > low else abs(effect) / 10.0
         return f"{rounded(effect, step, True)} [{rounded(low, step, True)}, {rounded(high, step, True)}]"
 
     @property
@@ -90,7 +90,10 @@ class Row:
     def values(self, one: float, other: float) -> tuple[str, str]:
         """Two values of the metric as texts, to the digits in which they differ."""
         one, other = (float(np.exp(value)) if self.in_logs else value for value in (one, other))
-        step = abs(other - one) or abs(one)
+        step = (abs(other - one) or abs(one)) / 5.0
+        if max(abs(one), abs(other)) < 1e-4 and step > 0.0:
+            digits = int(np.clip(np.floor(np.log10(abs(one) + abs(other))) - np.floor(np.log10(step)), 0, 9))
+            return f"{one:.{digits}e}", f"{other:.{digits}e}"
         return rounded(one, step), rounded(other, step)
 
     def _shown(self, value: float) -> float:
@@ -126,20 +129,22 @@ def by_slice(rows: list[Row]) -> dict[str, list[Row]]:
     return dict(found)
 
 
-def sensible(value: float, digits: int = 2) -> str:
-    """To significant digits, without an exponent where that is readable; a dash for none."""
-    return rounded(value, abs(value) / 10.0 ** (digits - 2))
+def sensible(value: float) -> str:
+    """To two significant digits, without zeros at their end; a dash for none."""
+    if not np.isfinite(value):
+        return "\N{EN DASH}"
+    return f"{value:.0f}" if 100.0 <= abs(value) < 1e6 else f"{value:.2g}"
 
 
 def rounded(value: float, step: float, signed: bool = False) -> str:
-    """With two significant digits of `step`, so that no digit is shown that means nothing."""
+    """To the first digit of `step`, to the second if the first is a 1, so that no digit is shown that means nothing."""
     if not np.isfinite(value):
         return "\N{EN DASH}"
-    sign = "+" if signed and value != 0.0 else ""
     if abs(value) >= 1e6 or 0.0 < abs(value) < 1e-6:
-        return f"{value:{sign}.1e}"
+        return f"{value:{'+' if signed else ''}.1e}"
     known = np.isfinite(step) and step > 0.0
-    return f"{value:{sign}.{int(np.clip(1.0 - np.floor(np.log10(step)), 0, 9)) if known else 0}f}"
+    text = f"{value:+.{int(np.clip(np.ceil(-np.log10(step / 2.0)), 0, 9)) if known else 0}f}"
+    return text[1:] if float(text) == 0.0 or (text[0] == "+" and not signed) else text
 
 
 def _verdict(suite: str, verdict: str, confirmed: bool) -> str:

@@ -91,6 +91,7 @@ addEventListener("DOMContentLoaded", () => {
   const dialog = one("dialog");
   for (const button of all(".enlarge")) {
     button.hidden = false;
+    one(".sides", button.parentElement).addEventListener("click", () => button.click());
     button.addEventListener("click", () => {
       const copies = [one("h3", button.parentElement), one(".sides", button.parentElement)].map((node) => node.cloneNode(true));
       for (const node of copies) all("[id]", node).forEach((item) => item.removeAttribute("id"));

@@ -48,7 +48,8 @@ class Drawn:
     height: int
     image: str  # a data address
     enlarged: float  # arrows are so many times as long as the residuals
-    rod: tuple[float, float]  # length of a scale for the arrows: in the drawing, and as a residual in px
+    rod: str  # a scale for the arrows, as the inside of an SVG element
+    bar_px: float  # the residual that it stands for
     sides: tuple[tuple[str, str, str], ...]  # name, marks as the inside of an SVG element, what was found
 
 
@@ -59,7 +60,14 @@ def drawn(picture: Picture) -> Drawn:
     step = _round_down(ARROW * width / enlarged)
     sides = (("baseline", picture.old), ("candidate", picture.new))
     shown = tuple((name, _marks(picture, side, enlarged), _found(side)) for name, side in sides)
-    return Drawn(picture, width, height, _address(picture.crop), enlarged, (step * enlarged, step), shown)
+    return Drawn(picture, width, height, _address(picture.crop), enlarged, _rod(picture, step * enlarged), step, shown)
+
+
+def _rod(picture: Picture, length: float) -> str:
+    """A bar near the lower left corner of the drawing, light on dark."""
+    height, width = picture.crop.shape
+    line = f"M{0.03 * width:.1f} {0.96 * height:.1f}h{length:.1f}"
+    return f'<path class="under" d="{line}"/><path class="rod" d="{line}"/>'
 
 
 def _address(crop: NDArray[np.uint8]) -> str:
@@ -86,14 +94,15 @@ def _round_down(value: float) -> float:
 
 
 def _marks(picture: Picture, side: Marks, enlarged: float) -> str:
-    """Crosses at the points, arrows from them along their residuals. Pixel i of a drawing covers [i, i + 1)."""
-    size = 0.012 * max(picture.crop.shape)
+    """Crosses at the points, askew since a board's edges meet there, arrows from them along their residuals. Pixel i of a drawing covers [i, i + 1)."""
+    size = 0.01 * max(picture.crop.shape)
     points = side.points_px - picture.corner + 0.5
     tips = points + enlarged * side.residuals_px
     crosses, arrows = [], []
     for (x, y), (u, v) in zip(points.tolist(), tips.tolist(), strict=True):
         if np.isfinite(x):
-            crosses.append(f"M{x - size:.1f} {y:.1f}h{2 * size:.1f}M{x:.1f} {y - size:.1f}v{2 * size:.1f}")
+            across = f"{2.0 * size:.1f}"
+            crosses.append(f"M{x - size:.1f} {y - size:.1f}l{across} {across}m-{across} 0l{across}-{across}")
         if np.isfinite(u):
             arrows.append(f"M{x:.1f} {y:.1f}L{u:.1f} {v:.1f}{_head(x, y, u, v, 1.5 * size)}")
     return f'<path class="cross" d="{"".join(crosses)}"/><path class="arrow" d="{"".join(arrows)}"/>'
@@ -116,4 +125,6 @@ def _found(side: Marks) -> str:
     if not found:
         return "nothing found"
     told = f"{found} of {len(side.points_px)} points"
-    return f"{told}, RMS {np.sqrt(np.mean(lengths**2)):.2g} px, largest {lengths.max():.2g} px" if len(lengths) else told
+    return (
+        f"{told}, RMS {np.sqrt(np.mean(lengths**2)):.2g} px, largest {lengths.max():.2g} px" if len(lengths) else told
+    )

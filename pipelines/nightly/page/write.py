@@ -44,7 +44,9 @@ def write_page(history: History, run_id: str | None, out: Path, pictures: Sequen
     ids = history.run_ids()
     if not ids or (run_id is not None and run_id not in ids):
         named = f"no run {run_id}" if ids else "no runs"
-        raise UserError(f"{history.root} has {named}; " + (f"the newest is {ids[-1]}" if ids else "run `nightly` first"))
+        raise UserError(
+            f"{history.root} has {named}; " + (f"the newest is {ids[-1]}" if ids else "run `nightly` first")
+        )
     end = len(ids) if run_id is None else ids.index(run_id) + 1
     shown = ids[max(0, end - MOST_NIGHTS) : end]
     runs = history.runs().to_pylist()[end - len(shown) : end]
@@ -88,7 +90,7 @@ def _of_night(runs: list[dict[str, Any]]) -> dict[str, Any]:
         "ended": ", ".join(f"{count} {word}" for word, count in ended.most_common()),
         "told": [(item, _word(item["exit"])) for item in reversed(others[-MOST_TOLD:])],
         "facts": _against(run["facts"], before["facts"] if before else run["facts"]),
-        "data": _against(run["data"], before["data"] if before else run["data"]),
+        "data": _against(run["data"], before["data"] if before else run["data"], of_itself=("fresh",)),
     }
 
 
@@ -126,10 +128,15 @@ def _word(code: int) -> str:
     return WORDS.get(Exit(code), "") if code in set(Exit) else f"exit {code}"
 
 
-def _against(now: list[dict[str, str]], before: list[dict[str, str]]) -> list[tuple[str, str, str | None]]:
-    """(name, value, the value of the night before where it was another)."""
-    old = {item["name"]: item["value"] for item in before}
-    return [
-        (item["name"], item["value"], None if old.get(item["name"]) == item["value"] else old.get(item["name"], "none"))
-        for item in now
-    ]
+def _against(
+    now: list[dict[str, str]], before: list[dict[str, str]], of_itself: Sequence[str] = ()
+) -> list[tuple[str, str, str | None]]:
+    """(name, value, the value of the night before where it was another). of_itself: what is another every night."""
+    old = {item["name"]: item["value"] for item in before} | {
+        item["name"]: item["value"] for item in now if item["name"] in of_itself
+    }
+    found: list[tuple[str, str, str | None]] = []
+    for item in now:
+        name, value = item["name"], item["value"]
+        found.append((name, value, None if old.get(name) == value else old.get(name, "none")))
+    return found

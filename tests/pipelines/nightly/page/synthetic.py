@@ -24,9 +24,7 @@ def history(root, nights, slices, suites=("pinned", "fresh"), faulty=True, names
     rng = np.random.default_rng(1)
     regimes = [f"regime-{i}" for i in range(1 + (slices - 1) // (len(CAMERAS) * len(SYSTEMS)))]
     every = [(f"{regime}/{camera}/{name}", held) for regime in regimes for camera in CAMERAS for name, held in SYSTEMS]
-    series = [
-        (suite, names(name), metric) for suite in suites for name, held in every[:slices] for metric in held
-    ]
+    series = [(suite, names(name), metric) for suite in suites for name, held in every[:slices] for metric in held]
     static = _static(series)
     for kind in ("runs", "findings"):
         (root / kind).mkdir(parents=True)
@@ -53,7 +51,12 @@ def _static(series):
     columns |= {"metric": [item[2].name for item in series], "unit": [item[2].unit for item in series]}
     encoded = {name: pa.array(values).dictionary_encode().cast(pa.string()) for name, values in columns.items()}
     margin = np.array([item[2].margin for item in series])
-    middle = np.array([-10.67 if item[2].name == "corner_log_ms" else -2.0 if item[2].kind is Kind.LOGARITHM else 0.0 for item in series])
+    middle = np.array(
+        [
+            -10.67 if item[2].name == "corner_log_ms" else -2.0 if item[2].kind is Kind.LOGARITHM else 0.0
+            for item in series
+        ]
+    )
     return encoded, margin, middle
 
 
@@ -69,7 +72,7 @@ def _findings(run_id, static, series, rng, fault):
         effect[biased] += 4.0 * margin[biased]
         verdict[biased] = "worse"
         verdict[-1], effect[-1] = "better", -2.5 * margin[-1]
-        verdict[np.flatnonzero(~of_one)[-2]] = "worse"
+        verdict[-2], effect[-2] = "worse", 1.8 * margin[-2]
     old = middle + 0.2 * margin
     numbers = {"old": old, "new": old + effect, "effect": effect, "low": effect - spread, "high": effect + spread}
     numbers |= {"p": np.full(n, 0.5), "margin": margin, "smallest_visible": 1.1 * margin}
