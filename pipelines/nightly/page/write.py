@@ -1,0 +1,142 @@
+"""Writing the page of a night from the history."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import shlex
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from datasets.errors import UserError
+from datasets.store.atomic import write_text
+from pipelines.nightly.history import History
+from pipelines.nightly.page import plots
+from pipelines.nightly.page.findings import CHANGED, ORDER, Row, by_slice, most_changed, tonight
+from pipelines.nightly.page.pictures import Picture, drawn
+from pipelines.nightly.page.series import Nights, headlines
+from pipelines.nightly.record import Exit
+from pipelines.report.template import rendered
+
+FOLDER = Path(__file__).parent
+MOST_NIGHTS = 365
+MOST_PICTURES = 12
+MOST_TOLD = 5  # nights that were not fine, in words
+COMMAND = "python -m pipelines nightly"
+WORDS = {
+    Exit.FINE: "fine",
+    Exit.WORSE: "worse",
+    Exit.NO_VERDICT: "no verdict",
+    Exit.COULD_NOT_RUN: "could not run",
+}
+
+
+def write_page(history: History, run_id: str | None, out: Path, pictures: Sequence[Picture] = ()) -> None:
+    """Write the page of a run, of the newest if `run_id` is None. pictures: the worst first; a dozen are shown.
+
+    The nights up to this run are shown with it, a year at most.
+
+    Raises:
+        UserError: no such run, a damaged file of the history, or the disk refuses.
+    """
+    ids = history.run_ids()
+    if not ids or (run_id is not None and run_id not in ids):
+        named = f"no run {run_id}" if ids else "no runs"
+        raise UserError(
+            f"{history.root} has {named}; " + (f"the newest is {ids[-1]}" if ids else "run `nightly` first")
+        )
+    end = len(ids) if run_id is None else ids.index(run_id) + 1
+    shown = ids[max(0, end - MOST_NIGHTS) : end]
+    runs = history.runs().to_pylist()[end - len(shown) : end]
+    findings = history.findings(shown)
+    rows = tonight(history.findings(shown[-1:]), runs[-1]["gates"])
+    nights = Nights(findings, shown)
+    style, script = ((FOLDER / name).read_text(encoding="utf-8") for name in ("page.css", "page.js"))
+    html = rendered(
+        FOLDER / "page.html",
+        style=style,
+        script=script,
+        policy=_policy(style, script),
+        **_of_night(runs),
+        **_of_findings(rows, nights, runs),
+        pictures=[drawn(picture) for picture in pictures[:MOST_PICTURES]],
+        accept=f"{COMMAND} accept {shlex.quote(shown[-1])} --reason 'why this is right'",
+    )
+    write_text(out, html)
+
+
+def _policy(style: str, script: str) -> str:
+    """Content security policy: nothing is loaded, and only this page's own style and script are used."""
+    digests = (hashlib.sha256(text.encode()).digest() for text in (style, script))
+    of_style, of_script = (f"'sha256-{base64.b64encode(digest).decode()}'" for digest in digests)
+    return (
+        f"default-src 'none'; style-src {of_style}; script-src {of_script}; img-src data:; "
+        "base-uri 'none'; form-action 'none'"
+    )
+
+
+def _of_night(runs: list[dict[str, Any]]) -> dict[str, Any]:
+    """The verdict, the gates, the machine, and how the nights before ended."""
+    run, before = runs[-1], runs[-2] if len(runs) > 1 else None
+    ended = Counter(_word(item["exit"]) for item in runs)
+    others = [item for item in runs[:-1] if item["exit"] != Exit.FINE]
+    return {
+        "run": run,
+        "word": _word(run["exit"]),
+        "runs": runs,
+        "words": [_word(item["exit"]) for item in runs],
+        "ended": ", ".join(f"{count} {word}" for word, count in ended.most_common()),
+        "told": [(item, _word(item["exit"])) for item in reversed(others[-MOST_TOLD:])],
+        "facts": _against(run["facts"], before["facts"] if before else run["facts"]),
+        "data": _against(run["data"], before["data"] if before else run["data"], of_itself=("fresh",)),
+    }
+
+
+def _of_findings(rows: list[Row], nights: Nights, runs: list[dict[str, Any]]) -> dict[str, Any]:
+    """The changes, the ways of the headline metrics, and the table of slices."""
+    changes = most_changed(rows)
+    moved = [i for i in range(1, len(runs)) if runs[i]["baseline"] != runs[i - 1]["baseline"]]
+    counts = Counter(row.verdict for row in rows)
+    return {
+        "changes": [(row, plots.interval(row)) for row in changes],
+        "more": sum(counts[name] for name in CHANGED) - len(changes),
+        "counts": [(name, counts[name]) for name in ORDER if counts[name]],
+        "compared": len(rows),
+        "moved": [(runs[i]["started"], runs[i]["baseline"]) for i in moved],
+        "trends": [_trend(row, nights, moved) for row in headlines(rows, changes)],
+        "slices": [
+            (name, own, plots.spark(nights.of(own[0].key)), f"{COMMAND} explain {shlex.quote(name)}")
+            for name, own in by_slice(rows).items()
+        ],
+    }
+
+
+def _trend(row: Row, nights: Nights, moved: list[int]) -> dict[str, Any]:
+    series = nights.of(row.key)
+    found = plots.trend(series, moved)
+    return {
+        "row": row,
+        "inside": found.inside,
+        "worse": int(series.worse.sum()),
+        "axis": row.values(found.highest, found.lowest),
+    }
+
+
+def _word(code: int) -> str:
+    return WORDS.get(Exit(code), "") if code in set(Exit) else f"exit {code}"
+
+
+def _against(
+    now: list[dict[str, str]], before: list[dict[str, str]], of_itself: Sequence[str] = ()
+) -> list[tuple[str, str, str | None]]:
+    """(name, value, the value of the night before where it was another). of_itself: what is another every night."""
+    old = {item["name"]: item["value"] for item in before} | {
+        item["name"]: item["value"] for item in now if item["name"] in of_itself
+    }
+    found: list[tuple[str, str, str | None]] = []
+    for item in now:
+        name, value = item["name"], item["value"]
+        found.append((name, value, None if old.get(name) == value else old.get(name, "none")))
+    return found
