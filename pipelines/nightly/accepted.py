@@ -28,6 +28,7 @@ class Baseline:
     version: Annotated[str | None, "installed version of `eposit`, instead of a checkout", NOT_EMPTY] = None
     commit: Annotated[str, "commit of the baseline's code", NOT_EMPTY]
     pinned_data: Annotated[str, "content hash of the pinned suite, 64 hexadecimal digits", Field(pattern=f"^{DIGEST}$")]
+    run: Annotated[str, "run of the history that was accepted", NOT_EMPTY]
     measures: Annotated[dict[str, str], "suite to the digest of its table of measures in the history"]
     accepted_by: Annotated[str, "who accepted it", NOT_EMPTY]
     accepted_on: Annotated[date, "when, as 2026-05-04"]

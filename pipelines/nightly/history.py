@@ -12,6 +12,7 @@ import secrets
 from collections.abc import Callable, Sequence
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -109,6 +110,16 @@ class History:
     def runs(self) -> pa.Table:
         """All runs, the oldest first: columns of `RUNS`."""
         return self._read("runs", self.run_ids(), RUNS)
+
+    def run(self, run_id: str) -> dict[str, Any]:
+        """One run: columns of `RUNS`.
+
+        Raises:
+            UserError: there is none of that name, or its file is damaged.
+        """
+        if run_id not in self.run_ids():
+            raise UserError(f"{self.root} has no run {run_id!r}; see `nightly report --history {self.root}` for its runs")
+        return self._read("runs", [run_id], RUNS).to_pylist()[0]
 
     def run_ids(self) -> list[str]:
         """Names of the runs, the oldest first."""

@@ -6,9 +6,8 @@ of its own that shares the pictures and their truth with the suite.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import pyarrow as pa
@@ -18,8 +17,8 @@ from datasets.errors import UserError
 from datasets.recipe.model import Recipe, load_recipe, parse_recipe
 from datasets.recipe.override import with_regime, with_values
 from datasets.store.claim import claim
-from datasets.store.dataset import Dataset, open_dataset
-from datasets.store.digest import table_digest
+from datasets.store.dataset import RECIPE_FILE, Dataset, open_dataset
+from datasets.store.digest import combined_digest, table_digest
 from datasets.store.reuse import share_pictures
 from pipelines.engines.engine import Engine
 from pipelines.nightly.measures import measure
@@ -94,11 +93,10 @@ def read_here(
     pictures: Dataset, folder: Path, settings: Sequence[Setting], engine: Engine, console: Console
 ) -> Reading:
     """Read a suite with this code, in a folder that shares its pictures."""
-    with claim(folder, pictures.recipe, (pictures.root / "recipe.toml").read_text(encoding="utf-8")) as dataset:
-        share_pictures(dataset, pictures)
-        stages.run_detect(dataset, engine, console)
-        stages.run_estimate(dataset, settings, engine, console)
-        stages.run_score(dataset, engine, console)
+    dataset = open_dataset(copy_pictures(pictures, folder))
+    stages.run_detect(dataset, engine, console)
+    stages.run_estimate(dataset, settings, engine, console)
+    stages.run_score(dataset, engine, console)
     return _reading(dataset)
 
 
@@ -108,14 +106,20 @@ def read_by(code: Code, pictures: Dataset, folder: Path, settings: Sequence[Sett
     Raises:
         OtherCodeError: that code failed, as when it does not understand the pictures' tables.
     """
-    with claim(folder, pictures.recipe, (pictures.root / "recipe.toml").read_text(encoding="utf-8")) as dataset:
-        share_pictures(dataset, pictures)
+    copy_pictures(pictures, folder)
     common = ("--workers", str(workers), "--quiet")
     code.run("detect", folder, *common)
     for setting in settings:
         code.run("estimate", folder, *_options(setting), *common)
     code.run("score", folder, *common)
     return _reading(open_dataset(folder))
+
+
+def copy_pictures(pictures: Dataset, folder: Path) -> Path:
+    """A new dataset's folder that shares the pictures and their truth of another."""
+    with claim(folder, pictures.recipe, (pictures.root / RECIPE_FILE).read_text(encoding="utf-8")) as dataset:
+        share_pictures(dataset, pictures)
+    return folder
 
 
 def _options(setting: Setting) -> tuple[str, ...]:
@@ -129,12 +133,8 @@ def _reading(dataset: Dataset) -> Reading:
     for setting in REPLAYED:
         shards = [path for path in dataset.shards("estimates") if path.name.startswith(f"{setting.name}-")]
         if shards:
-            replayed[setting.name] = _digest([table_digest(dataset.read_shard(path)) for path in shards])
+            replayed[setting.name] = combined_digest("", ((path.name, table_digest(dataset.read_shard(path))) for path in shards))
     return Reading(measure(dataset), replayed)
-
-
-def _digest(parts: Sequence[str]) -> str:
-    return hashlib.sha256("".join(parts).encode()).hexdigest()
 
 
 def pictures_digest(dataset: Dataset) -> str:
@@ -146,10 +146,4 @@ def pictures_digest(dataset: Dataset) -> str:
     paths = [path for table in ("frames", "keypoints") for path in dataset.shards(table)]
     if not paths:
         raise UserError(f"{dataset.root} holds no pictures; delete it, and the next night makes them again")
-    return _digest([table_digest(dataset.read_shard(path)) for path in paths])
-
-
-def small(suite: Suite, frames: int) -> Suite:
-    """A suite whose dataset is stored in shards of so many frames, for timing one of them."""
-    text = with_values(suite.text, {("shard_frames",): frames}, suite.name)
-    return replace(suite, recipe=parse_recipe(text, suite.name), text=text)
+    return combined_digest("", ((path.name, table_digest(dataset.read_shard(path))) for path in paths))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from pipelines.nightly.comparison import Verdict
 from pipelines.nightly.judgement import Finding, Judgement
 from pipelines.nightly.record import Exit, Outcome, State
@@ -10,19 +12,30 @@ GATE = "accuracy"
 ALPHA = 0.01  # chance of a false alarm a night, over all slices and metrics
 
 
-def judge(found: Judgement) -> Outcome:
-    """Worse fails; what is neither shown to be worse nor to be equal warns."""
+Waived = Callable[[str, str], bool]  # whether somebody has accepted a metric in a slice
+
+
+def judge(found: Judgement, waived: Waived) -> Outcome:
+    """Worse fails, unless it is waived; what is neither shown to be worse nor to be equal warns."""
     if found.identical:
         return Outcome(GATE, State.PASSED, "every number of every frame is the same as the baseline's")
     worse, unproved, better = (found.of(v) for v in (Verdict.WORSE, Verdict.UNPROVED, Verdict.BETTER))
     if worse:
-        return Outcome(GATE, State.FAILED, describe(worse), Exit.WORSE, tuple(worse))
+        return failed(GATE, worse, waived)
     if unproved:
         told = f"{len(unproved)} of {len(found.findings)} metrics are neither shown to be worse nor to be equal"
         return Outcome(GATE, State.WARNED, told, findings=tuple(unproved))
     if better:
         return Outcome(GATE, State.CHANGED, describe(better), findings=tuple(better))
     return Outcome(GATE, State.PASSED, f"all {len(found.findings)} metrics are equal within their margins")
+
+
+def failed(gate: str, worse: list[Finding], waived: Waived) -> Outcome:
+    """The outcome of a gate that found something worse: waived if all of it is."""
+    left = [item for item in worse if not waived(item.slice, item.change.metric.name)]
+    if left:
+        return Outcome(gate, State.FAILED, describe(left), Exit.WORSE, tuple(left))
+    return Outcome(gate, State.WAIVED, f"accepted: {describe(worse)}", findings=tuple(worse))
 
 
 def describe(findings: list[Finding]) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from pipelines.nightly.comparison import Verdict, verdicts
-from pipelines.nightly.gates.accuracy import describe
+from pipelines.nightly.gates.accuracy import Waived, failed
 from pipelines.nightly.judgement import Finding, Judgement
 from pipelines.nightly.record import Exit, Outcome, State
 
@@ -17,7 +17,7 @@ GATE = "fresh"
 ALPHA = 0.05
 
 
-def judge(first: Judgement, again: Callable[[], Judgement]) -> Outcome:
+def judge(first: Judgement, again: Callable[[], Judgement], waived: Waived) -> Outcome:
     """Flag on the first views, confirm on others. again: a comparison on views of another seed, made only if needed."""
     flagged = first.of(Verdict.WORSE)
     if not flagged:
@@ -26,7 +26,7 @@ def judge(first: Judgement, again: Callable[[], Judgement]) -> Outcome:
     if not confirmed:
         told = f"{len(flagged)} metrics looked worse on tonight's views and not on others, as chance does"
         return Outcome(GATE, State.PASSED, told, findings=tuple(flagged))
-    return Outcome(GATE, State.FAILED, describe(confirmed), Exit.WORSE, tuple(confirmed))
+    return failed(GATE, confirmed, waived)
 
 
 def confirm(flagged: Iterable[Finding], again: Iterable[Finding]) -> list[Finding]:
