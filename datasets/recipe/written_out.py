@@ -8,7 +8,7 @@ from typing import Any
 
 import tomlkit
 from tomlkit import TOMLDocument
-from tomlkit.items import AoT, Table
+from tomlkit.items import AoT, Item, Table
 
 from datasets.errors import UserError
 from datasets.recipe.camera_sets import camera_entries, entry_cameras, names_cameras, resolved
@@ -41,6 +41,7 @@ def _write_cameras(document: TOMLDocument, source: str) -> str:
     if isinstance(cameras, AoT):
         tables = [table for entry in cameras.body for table in _tables(entry, source)]
     else:
+        assert isinstance(cameras, Item)  # a text or an array
         named = f"cameras = {cameras.as_string()}{cameras.trivia.comment_ws}{cameras.trivia.comment}"
         tables = [_commented(named), *_written(resolved(cameras.unwrap(), source))]
     return "\n".join([document.as_string().rstrip() + "\n", *tables])

@@ -22,6 +22,6 @@ stop() {
 
 hosts=("$@")
 trap stop EXIT
-"$bin/ray" start --head --port="${address##*:}"
+"$bin/ray" start --head --port="${address##*:}" --disable-usage-stats
 everywhere "$bin/ray start --address=$address"
 "$bin/python" -m pipelines run "$recipe" --out "$out" --engine ray --ray-address "$address"

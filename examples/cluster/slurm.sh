@@ -15,4 +15,4 @@ if [[ -n ${SLURM_ARRAY_TASK_ID:-} ]]; then # on a node: array tasks count from 1
     exec "$python" -m pipelines run "$recipe" --out "$out" --shard "$SLURM_ARRAY_TASK_ID/$SLURM_ARRAY_TASK_COUNT" --quiet
 fi
 job=$(sbatch --parsable --array="1-$tasks" "$0" "$recipe" "$out")
-sbatch --dependency="afterok:$job" --wrap "$(printf '%q -m pipelines report %q' "$python" "$out")"
+sbatch --dependency="afterok:$job" --kill-on-invalid-dep=yes --wrap "$(printf '%q -m pipelines report %q' "$python" "$out")"

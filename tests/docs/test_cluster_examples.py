@@ -90,7 +90,7 @@ def test_a_slurm_array_runs_every_part_and_then_the_report(stand_ins, tmp_path, 
     submitted, *ran, wrapped, reported = calls.read_text().splitlines()
     assert submitted == f"sbatch --parsable --array=1-3 {script} a recipe.toml {root}"
     assert ran == parts
-    assert wrapped.startswith("sbatch --dependency=afterok:77 --wrap ")
+    assert wrapped.startswith("sbatch --dependency=afterok:77 --kill-on-invalid-dep=yes --wrap ")
     assert reported == f"python -m pipelines report {root}"
 
 
@@ -114,7 +114,7 @@ def test_ray_starts_everywhere_runs_and_stops(stand_ins, tmp_path, monkeypatch):
     lines = calls.read_text().splitlines()
     address = lines[2].removeprefix("ray start --address=")
     assert lines == [
-        "ray start --head --port=6379",
+        "ray start --head --port=6379 --disable-usage-stats",
         *("ssh one", f"ray start --address={address}", "ssh two", f"ray start --address={address}"),
         f"python -m pipelines run demo --out {tmp_path / 'out'} --engine ray --ray-address {address}",
         *("ssh one", "ray stop", "ssh two", "ray stop", "ray stop"),
@@ -127,4 +127,4 @@ def test_ray_stops_also_after_a_run_that_failed(stand_ins, tmp_path, monkeypatch
     monkeypatch.setenv("BIN", str(folder))
     shutil.copy("/bin/false", folder / "python")
     assert run("ray.sh", "demo", tmp_path / "out").returncode == 1
-    assert calls.read_text().splitlines() == ["ray start --head --port=6379", "ray stop"]
+    assert calls.read_text().splitlines() == ["ray start --head --port=6379 --disable-usage-stats", "ray stop"]

@@ -35,6 +35,13 @@ CASES = {
     "noise not a number": (estimate("--points", "truth+noise", "--noise-px", "nan"), "noise of nan px is not usable"),
     "zero draws": (estimate("--points", "truth+noise", "--draws", "0"), "0 draws are not usable"),
     "zero workers": (estimate("--solver", "posit", "--workers", "0"), "0 workers are not usable; give --workers from"),
+    "unknown engine": (estimate("--engine", "spark"), "unknown engine 'spark'; choose one of local, ray"),
+    "address of no engine": (estimate("--ray-address", "head:6379"), "--ray-address goes with --engine ray"),
+    "part zero": (estimate("--shard", "0/4"), "shard '0/4' is not usable; give --shard I/N with I from 1 to N"),
+    "part of a new dataset": (
+        lambda place: ("run", place.recipe(), "--out", place.new(), "--shard", "5/4"),
+        "shard '5/4' is not usable",
+    ),
     "too many workers": (estimate("--solver", "posit", "--workers", "999"), "999 workers are not usable"),
 }
 
