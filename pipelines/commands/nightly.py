@@ -1,131 +1,143 @@
-"""Commands that judge accuracy: is one dataset's worse than another's?"""
+"""`nightly`: accuracy against a frozen baseline, night by night."""
 
 from __future__ import annotations
 
+import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.console import Console
 
 from datasets.errors import UserError
 from pipelines.commands import options as o
-from pipelines.commands.opening import opened
 from pipelines.commands.tables import Column, print_json, print_table
 
 if TYPE_CHECKING:
-    from pipelines.nightly.judgement import Failures, Finding, Judgement
+    from pipelines.nightly.record import Night
 
-WORSE = 1  # exit code
-COLUMNS = (
-    Column("  verdict"), Column("metric"), Column("from", True), Column("to", True), Column("change, 95 %", True),
-)  # fmt: skip
-MOST_NAMED = 10  # frames that fail anew, in one line
+NIGHTS_BACK = 14  # of the trend that `explain` prints
+REGIMES = ["typical", "harsh"]
 
-Old = Annotated[Path, typer.Argument(metavar="OLD", help="Folder of the dataset to compare with.")]
-New = Annotated[Path, typer.Argument(metavar="NEW", help="Folder of the dataset that is judged.")]
-Alpha = Annotated[float, typer.Option(help="Chance of a false alarm, over all metrics and slices together.")]
+HistoryFolder = Annotated[Path, typer.Option("--history", help="Folder of the nights: history, baselines, pictures.")]
+Regimes = Annotated[list[str], typer.Option("--regime", help="Sensor regime of the pictures; may be given again.")]
+Seed = Annotated[int | None, typer.Option(min=0, help="Seed of the fresh pictures.  [default: the date, as 20260504]")]
+Without = Annotated[
+    list[str] | None, typer.Option("--without", help="Gate that is left out: fresh or speed; may be given again.")
+]
+Judged = Annotated[
+    list[str] | None,
+    typer.Option("--solver", help="One more solver, or your own function, judged on the pinned pictures."),
+]
+RunName = Annotated[str, typer.Argument(metavar="RUN", help="Run of the history, or `latest`.")]
+SliceName = Annotated[str, typer.Argument(metavar="SLICE", help="As regime/camera/system.")]
+OfRun = Annotated[str, typer.Option("--run", help="Run of the history.")]
+Reason = Annotated[str, typer.Option(help="Why; it stays in baselines.toml.")]
+Until = Annotated[str | None, typer.Option(metavar="DATE", help="Last day of a waiver, as 2026-05-04.")]
+By = Annotated[str | None, typer.Option(help="Who accepts.  [default: the user's name]")]
+Gate = Annotated[
+    str | None, typer.Option(help="Waive a failure of this gate instead: accuracy, fresh, failures, tail or speed.")
+]
+OfSlice = Annotated[str | None, typer.Option("--slice", help="Slice of the failure; of gate speed the stage.")]
+Metric = Annotated[str | None, typer.Option(help="Metric of the failure.")]
+FrameId = Annotated[int | None, typer.Option("--frame", help="Frame of the failure, of gate failures.")]
 
 
-def compare(old: Old, new: New, alpha: Alpha = 0.01, json: o.Json = False) -> None:
-    """Tell whether NEW is worse than OLD; exit code 1 if it is.
+def run(
+    recipe: o.RecipeName,
+    history: HistoryFolder,
+    regime: Regimes = REGIMES,
+    seed: Seed = None,
+    solver: Judged = None,
+    without: Without = None,
+    workers: o.Workers = 1,
+    quiet: o.Quiet = False,
+) -> None:
+    """Run a night: exit code 0 fine, 1 worse, 2 wrong use, 3 no verdict, 4 could not run.
 
-    Both have been scored. The same views, with other code or another sensor, are compared frame by frame, which shows
-    the smallest changes; other views of the same recipe as two samples.
+    The pinned pictures are made in the first night. Without a baseline there is no verdict: `nightly accept` makes a
+    run the baseline, and keeps a copy of its code. The page, and files for machines, lie in the history's folder.
     """
-    from pipelines.nightly.comparison import LEAST_POSES
-    from pipelines.nightly.judgement import judge
-    from pipelines.nightly.measures import measure, same_views
+    from pipelines.nightly.night import Request, run_night
 
-    if not 0.0 < alpha < 1.0:
-        raise UserError(f"--alpha {alpha:g}: a chance lies between 0 and 1; take 0.01")
-    before, after = opened(old), opened(new)
-    found = judge(measure(before), measure(after), alpha, same_views(before, after))
-    if not found.findings and not found.identical:
-        raise UserError(
-            f"{old} and {new} have no slice with {LEAST_POSES} common poses; compare larger runs of one recipe"
-        )
+    for name in without or []:
+        if name not in ("fresh", "speed"):
+            raise UserError(f"--without {name}: choose fresh or speed; the other gates cost nothing")
+    request = Request(
+        recipe=recipe,
+        history=history,
+        regimes=tuple(dict.fromkeys(regime)),
+        seed=int(f"{datetime.date.today():%Y%m%d}") if seed is None else seed,
+        solvers=_settings(solver or []),
+        workers=workers,
+        without=tuple(without or ()),
+    )
+    night = run_night(request, Console(quiet=quiet, stderr=True))
+    _print_night(night, history)
+    if night.exit:
+        raise SystemExit(int(night.exit))
+
+
+def accept(
+    run: RunName,
+    history: HistoryFolder,
+    reason: Reason,
+    until: Until = None,
+    by: By = None,
+    gate: Gate = None,
+    slice: OfSlice = None,
+    metric: Metric = None,
+    frame: FrameId = None,
+) -> None:
+    """Make a run the baseline, or waive one failure of it (--gate); who, why and until when is kept."""
+    from pipelines.nightly.acceptance import accept_baseline, waive
+
+    if gate is None:
+        if until is not None or slice is not None or metric is not None or frame is not None:
+            raise UserError("--until, --slice, --metric and --frame belong to a waiver; give its --gate, too")
+        name = accept_baseline(history, run, reason, by)
+        typer.echo(f"{name} is the baseline now; its code is kept in {history / 'code'}")
+        return
+    told = waive(history, run, gate=gate, slice=slice, metric=metric, frame=frame, reason=reason, by=by, until=until)
+    typer.echo(f"waived: {told}")
+
+
+def explain(slice: SliceName, history: HistoryFolder, run: OfRun = "latest", json: o.Json = False) -> None:
+    """Show what a run found in one slice: every metric, its last nights, and the frames that moved most."""
+    from pipelines.nightly.explanation import explain as explained
+
+    found = explained(history, run, slice, NIGHTS_BACK)
     if json:
-        print_json(_as_json(found, alpha))
-    else:
-        _print(found, alpha)
-    if _is_worse(found):
-        raise SystemExit(WORSE)
+        print_json(found.as_json())
+        return
+    typer.echo(f"{slice}, run {found.run_id}")
+    columns = [Column("suite"), Column("metric"), *(Column(name, True) for name in ("change", "95 %", "margin"))]
+    print_table((*columns, Column("verdict")), found.rows())
+    for line in found.lines():
+        typer.echo(line)
 
 
-def _is_worse(found: Judgement) -> bool:
-    return found.new_failures > 0 or any(item.verdict == "worse" for item in found.findings)
+def report(history: HistoryFolder, run: OfRun = "latest") -> None:
+    """Write report.html anew from the history."""
+    from pipelines.nightly.history import History
+    from pipelines.nightly.page import write_page
+
+    path = history / "report.html"
+    nights = History(history)
+    write_page(nights, nights.name_of(run), path)
+    typer.echo(str(path))
 
 
-def _print(found: Judgement, alpha: float) -> None:
-    from pipelines.nightly.comparison import Verdict
+def _settings(names: list[str]) -> tuple[Any, ...]:
+    from pipelines.adapters.registry import find_solver, takes_four
+    from pipelines.stages.settings import Setting
 
-    changed = found.of(Verdict.WORSE) + found.of(Verdict.BETTER)
-    for name in dict.fromkeys(item.slice for item in changed):
-        typer.echo(name)
-        print_table(COLUMNS, [_cells(item) for item in changed if item.slice == name])
-        typer.echo()
-    for item in found.failures:
-        if item.new:
-            typer.echo(_failure_line(item))
-    for names, side in ((found.only_old, "NEW"), (found.only_new, "OLD")):
-        if names:
-            typer.echo(f"not in {side}, so not compared: {', '.join(names)}")
-    typer.echo(_sentence(found, alpha))
+    for name in names:
+        find_solver(name)
+    return tuple(Setting(name, use="four" if takes_four(name) else "all") for name in names)
 
 
-def _cells(item: Finding) -> tuple[str, ...]:
-    change = item.change
-    low, high = change.interval
-    unit = "" if change.metric.unit == "1" else f" ({change.metric.unit})"
-    numbers = f"{change.old:.3g}", f"{change.new:.3g}", f"{low:+.2g} to {high:+.2g}"
-    return f"  {item.verdict}", f"{change.metric.name}{unit}", *numbers
-
-
-def _failure_line(item: Failures) -> str:
-    shown = ", ".join(map(str, item.new[:MOST_NAMED])) + (", ..." if len(item.new) > MOST_NAMED else "")
-    return f"{item.slice}: {len(item.new)} of {item.frames} frames fail anew, {len(item.mended)} no longer: {shown}"
-
-
-def _sentence(found: Judgement, alpha: float) -> str:
-    from pipelines.nightly.comparison import Verdict
-
-    if found.identical:
-        return "identical: every number of every frame is the same"
-    counts = {verdict: len(found.of(verdict)) for verdict in Verdict}
-    told = ", ".join(f"{count} {verdict}" for verdict, count in counts.items() if count) or "nothing to compare"
-    how = "frame by frame" if found.paired else "as two samples of other views"
-    failed = f"; {found.new_failures} new failures" if found.paired else ""
-    return f"{len(found.findings)} metrics compared {how}, false alarms at {100 * alpha:g} %: {told}{failed}"
-
-
-def _as_json(found: Judgement, alpha: float) -> dict[str, Any]:
-    tests = max(len(found.findings), 1)
-    return {
-        "worse": _is_worse(found),
-        "identical": found.identical,
-        "paired": found.paired,
-        "alpha": alpha,
-        "only_old": found.only_old,
-        "only_new": found.only_new,
-        "failures": [
-            {"slice": item.slice, "frames": item.frames, "new": item.new, "mended": item.mended, "p": item.p}
-            for item in found.failures
-        ],
-        "findings": [
-            {
-                "slice": item.slice,
-                "metric": item.change.metric.name,
-                "unit": item.change.metric.unit,
-                "verdict": item.verdict,
-                "poses": item.change.poses,
-                "old": item.change.old,
-                "new": item.change.new,
-                "effect": item.change.effect,
-                "interval": item.change.interval,
-                "p": item.change.p,
-                "margin": item.change.metric.margin,
-                "smallest_visible": item.change.smallest_visible(alpha, tests),
-            }
-            for item in found.findings
-        ],
-    }
+def _print_night(night: Night, history: Path) -> None:
+    rows = [(item.gate, item.state, item.sentence) for item in night.outcomes]
+    print_table((Column("gate"), Column("state"), Column("what was found")), rows)
+    typer.echo(f"\nexit {int(night.exit)}, {night.sentence}\nrun {night.run_id}, page {history / 'report.html'}")

@@ -25,6 +25,7 @@ from pipelines.nightly.judgement import Finding
 from pipelines.nightly.record import Night
 
 SCHEMA_VERSION = "1"
+LATEST = "latest"
 _TEXT = pa.string()
 _PAIRS = pa.list_(pa.struct([("name", _TEXT), ("value", _TEXT)]))
 
@@ -111,15 +112,28 @@ class History:
         """All runs, the oldest first: columns of `RUNS`."""
         return self._read("runs", self.run_ids(), RUNS)
 
+    def name_of(self, run: str) -> str:
+        """A run's name; `latest` is the newest.
+
+        Raises:
+            UserError: there is no run, or none of that name.
+        """
+        ids = self.run_ids()
+        if not ids:
+            raise UserError(f"{self.root} holds no nights; run `nightly run` with this --history first")
+        if run == LATEST:
+            return ids[-1]
+        if run not in ids:
+            raise UserError(f"{self.root} has no run {run!r}; give `latest`, or a name from its folder `runs`")
+        return run
+
     def run(self, run_id: str) -> dict[str, Any]:
         """One run: columns of `RUNS`.
 
         Raises:
             UserError: there is none of that name, or its file is damaged.
         """
-        if run_id not in self.run_ids():
-            raise UserError(f"{self.root} has no run {run_id!r}; see `nightly report --history {self.root}` for its runs")
-        return self._read("runs", [run_id], RUNS).to_pylist()[0]
+        return self._read("runs", [self.name_of(run_id)], RUNS).to_pylist()[0]
 
     def run_ids(self) -> list[str]:
         """Names of the runs, the oldest first."""

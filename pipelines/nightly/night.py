@@ -25,7 +25,10 @@ from pipelines.nightly.baselines import FILE_NAME, Baselines, load
 from pipelines.nightly.gates import accuracy, data, failures, fresh, regenerate, replay, speed, tail
 from pipelines.nightly.history import History, new_run_id
 from pipelines.nightly.judgement import Finding, Judgement, judge
-from pipelines.nightly.other_code import ROOT, Code, OtherCodeError
+from pipelines.nightly.other_code import ROOT, Code, OtherCodeError, freeze
+from pipelines.nightly.outputs import write_all
+from pipelines.nightly.outputs.results import Results
+from pipelines.nightly.page import write_page
 from pipelines.nightly.record import Exit, Night, Outcome, State
 from pipelines.stages.settings import Setting
 
@@ -95,7 +98,7 @@ def run_night(request: Request, console: Console) -> Night:
     baselines, history = load(request.history / FILE_NAME), History(request.history)
     has_baseline = any(item.recipe == request.recipe for item in baselines.baselines)
     baseline = baselines.current(request.recipe) if has_baseline else None
-    found = Found()
+    found = Found(data={"code": freeze(request.history / "code").name})
     with _work_folder(request.history) as work:
         desk = Desk(request, history, work, baselines, LocalEngine(request.workers), console)
         try:
@@ -109,6 +112,8 @@ def run_night(request: Request, console: Console) -> Night:
         tuple(found.data.items()), tuple(found.outcomes),
     )  # fmt: skip
     history.append(night, found.findings, accuracy.ALPHA, found.measures)
+    write_all(Results(night, found.findings, accuracy.ALPHA, found.measures), request.history)
+    write_page(history, night.run_id, request.history / "report.html")
     return night
 
 
@@ -122,7 +127,8 @@ def facts() -> list[tuple[str, str]]:
 
 
 def _judge_all(desk: Desk, wanted: list[suites.Suite], baseline: Baseline | None, found: Found) -> None:
-    pictures = {suite.name: suite.make(desk.request.history / "pictures" / suite.name, desk.engine, desk.console) for suite in wanted}
+    store = desk.request.history / "pictures"
+    pictures = {suite.name: suite.make(store / suite.name, desk.engine, desk.console) for suite in wanted}
     digests = {name: suites.pictures_digest(dataset) for name, dataset in pictures.items()}
     pinned = combined_digest("", digests.items())
     found.data |= {suites.PINNED: pinned, **digests}
@@ -159,6 +165,7 @@ def _machine(known: dict[str, str]) -> dict[str, str]:
 
 def _judge_numbers(desk: Desk, pictures: dict[str, Dataset], baseline: Baseline, found: Found) -> None:
     old, new = desk.history.measures(baseline.measures[suites.PINNED]), found.measures["pinned new"]
+    found.measures["pinned old"] = old
     pinned = judge(old, new, accuracy.ALPHA, paired=True)
     found.findings[suites.PINNED] = pinned.findings
     found.outcomes.append(accuracy.judge(pinned, lambda *what: desk.waived(accuracy.GATE, *what)))

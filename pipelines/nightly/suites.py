@@ -133,7 +133,9 @@ def _reading(dataset: Dataset) -> Reading:
     for setting in REPLAYED:
         shards = [path for path in dataset.shards("estimates") if path.name.startswith(f"{setting.name}-")]
         if shards:
-            replayed[setting.name] = combined_digest("", ((path.name, table_digest(dataset.read_shard(path))) for path in shards))
+            replayed[setting.name] = combined_digest(
+                "", ((path.name, table_digest(dataset.read_shard(path))) for path in shards)
+            )
     return Reading(measure(dataset), replayed)
 
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable
 from pipelines.nightly.comparison import Verdict, verdicts
 from pipelines.nightly.gates.accuracy import Waived, failed
 from pipelines.nightly.judgement import Finding, Judgement
-from pipelines.nightly.record import Exit, Outcome, State
+from pipelines.nightly.record import Outcome, State
 
 GATE = "fresh"
 ALPHA = 0.05
