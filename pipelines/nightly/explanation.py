@@ -11,7 +11,7 @@ import numpy as np
 
 from datasets.errors import UserError, did_you_mean
 from pipelines.nightly.history import History
-from pipelines.nightly.measures import slices
+from pipelines.nightly.measures import Slice, slices
 
 MOST_FRAMES = 10
 
@@ -91,25 +91,20 @@ def _moved(history: History, run_id: str, slice: str, findings: tuple[dict[str, 
     for suite in dict.fromkeys(item["suite"] for item in findings):
         if f"{suite} old" not in digests:
             continue
-        old, new = (
-            {s.name: s for s in slices(history.measures(digests[f"{suite} {side}"]))} for side in ("old", "new")
-        )
-        if slice not in old or slice not in new:
-            continue
-        before, after = old[slice], new[slice]
-        for item in findings:
-            name = item["metric"]
-            if item["suite"] == suite and name in before.values and name in after.values:
-                step = np.abs(after.values[name] - before.values[name]) / item["margin"]
-                moved += [
-                    Moved(
-                        suite,
-                        int(after.frame_id[i]),
-                        name,
-                        float(before.values[name][i]),
-                        float(after.values[name][i]),
-                        float(step[i]),
-                    )
-                    for i in np.flatnonzero(np.isfinite(step) & (step > 0.0))
-                ]
+        tables = (history.measures(digests[f"{suite} {side}"]) for side in ("old", "new"))
+        before, after = (next((item for item in slices(table) if item.name == slice), None) for table in tables)
+        if before is not None and after is not None:
+            margins = {item["metric"]: item["margin"] for item in findings if item["suite"] == suite}
+            moved += _steps(suite, before, after, margins)
     return sorted(moved, key=lambda item: -item.margins)[:MOST_FRAMES]
+
+
+def _steps(suite: str, before: Slice, after: Slice, margins: dict[str, float]) -> Iterator[Moved]:
+    """Every metric of every frame that both sides have and that differs."""
+    frames, of_old, of_new = np.intersect1d(before.frame_id, after.frame_id, return_indices=True)
+    for name, margin in margins.items():
+        if name in before.values and name in after.values:
+            old, new = before.values[name][of_old], after.values[name][of_new]
+            for i in np.flatnonzero(np.isfinite(old) & np.isfinite(new) & (old != new)):
+                step = abs(float(new[i] - old[i])) / margin
+                yield Moved(suite, int(frames[i]), name, float(old[i]), float(new[i]), step)

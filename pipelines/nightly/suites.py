@@ -133,9 +133,7 @@ def _reading(dataset: Dataset) -> Reading:
     for setting in REPLAYED:
         shards = [path for path in dataset.shards("estimates") if path.name.startswith(f"{setting.name}-")]
         if shards:
-            replayed[setting.name] = combined_digest(
-                "", ((path.name, table_digest(dataset.read_shard(path))) for path in shards)
-            )
+            replayed[setting.name] = _digest(dataset, shards)
     return Reading(measure(dataset), replayed)
 
 
@@ -148,4 +146,8 @@ def pictures_digest(dataset: Dataset) -> str:
     paths = [path for table in ("frames", "keypoints") for path in dataset.shards(table)]
     if not paths:
         raise UserError(f"{dataset.root} holds no pictures; delete it, and the next night makes them again")
-    return combined_digest("", ((path.name, table_digest(dataset.read_shard(path))) for path in paths))
+    return _digest(dataset, paths)
+
+
+def _digest(dataset: Dataset, shards: Sequence[Path]) -> str:
+    return combined_digest("", ((path.name, table_digest(dataset.read_shard(path))) for path in shards))
