@@ -1,7 +1,7 @@
 """A dataset on disk: atomic Parquet shards, bound to one recipe, resumable, verifiable.
 
 A shard is written to a temporary name, flushed, checked and renamed; it is valid if it can be read and its footer
-carries the recipe's hash and the schema's version. Resuming is doing what is not there.
+carries the recipe's hash and a version of the schema that can be read. Resuming is doing what is not there.
 """
 
 from __future__ import annotations
@@ -19,7 +19,9 @@ from datasets.recipe.model import Recipe, load_recipe
 from datasets.schema import SCHEMA_VERSION, TABLES, dictionary
 from datasets.store.atomic import replace_atomically, write_text
 from datasets.store.digest import table_digest
-from datasets.store.refusals import SHARD_NAME, damaged, missing, refused, stage_of, unreadable
+from datasets.store.nulls import with_nulls
+from datasets.store.refusals import SHARD_NAME, damaged, missing, refused, stage_of, unreadable, unsupported
+from datasets.store.versions import READABLE, upgraded
 
 RECIPE_FILE = "recipe.toml"
 MANIFEST_FILE = "manifest.json"
@@ -42,17 +44,21 @@ class Dataset:
         """The number of a shard."""
         return int(path.stem.rsplit("-", 3)[1])
 
-    def sibling(self, path: Path, table: str) -> Path:
+    def sibling(self, path: Path, table: str, variant: str = "") -> Path:
         """The shard of another table over the same frames."""
         count = int(path.stem.rsplit("-", 1)[1])
-        return self.shard_path(table, self.index_of(path), count)
+        return self.shard_path(table, self.index_of(path), count, variant)
 
     def is_done(self, path: Path) -> bool:
-        """Whether a valid shard of this recipe is there."""
+        """Whether a valid shard of this recipe is there.
+
+        Raises:
+            UserError: it may not be read, or its version cannot be.
+        """
         if not path.is_file():
             return False
         try:
-            return self._footer_problem(pq.read_metadata(path).metadata or {}) is None
+            return self._is_of_recipe(path, pq.read_metadata(path).metadata or {})
         except PermissionError:
             raise unreadable(path) from None
         except (pa.ArrowInvalid, OSError):
@@ -64,8 +70,7 @@ class Dataset:
         Raises:
             UserError: the disk or its permissions refuse.
         """
-        schema = TABLES[path.parent.name]
-        table = rows.cast(schema)
+        table = with_nulls(rows.cast(TABLES[path.parent.name]))
         metadata = {
             RECIPE_KEY: self.recipe.digest().encode(),
             VERSION_KEY: SCHEMA_VERSION.encode(),
@@ -90,12 +95,27 @@ class Dataset:
             raise refused(path, error) from error
 
     def read_shard(self, path: Path, columns: list[str] | None = None) -> pa.Table:
-        """The rows of one shard, or some columns of them.
+        """The rows of one shard, or some columns of them; those of an earlier version of the schema in today's form.
 
         Raises:
-            UserError: missing, unreadable, truncated, of another recipe or of another schema version.
+            UserError: missing, unreadable, truncated, of another recipe or of a version that cannot be read.
+        """
+        rows = self.stored_rows(path, columns)
+        if _version(rows.schema.metadata) == SCHEMA_VERSION:
+            return rows
+        name = path.parent.name
+        return upgraded(rows, name).select(columns or TABLES[name].names)
+
+    def stored_rows(self, path: Path, columns: list[str] | None = None) -> pa.Table:
+        """The rows of one shard as they lie in its file, or those of some columns that are there.
+
+        Raises:
+            UserError: as `read_shard`.
         """
         try:
+            if columns is not None:
+                there = pq.read_schema(path).names
+                columns = [name for name in columns if name in there]
             table = pq.read_table(path, columns=columns)
         except FileNotFoundError:
             raise missing(path) from None
@@ -103,17 +123,19 @@ class Dataset:
             raise unreadable(path) from None
         except (pa.ArrowInvalid, OSError):
             raise damaged(path) from None
-        problem = self._footer_problem(table.schema.metadata or {})
-        if problem:
-            raise UserError(f"{path} {problem}; delete it and run the {stage_of(path)} stage again")
+        if not self._is_of_recipe(path, table.schema.metadata or {}):
+            raise UserError(f"{path} belongs to another recipe; delete it and run the {stage_of(path)} stage again")
         return table
 
-    def _footer_problem(self, metadata: dict[bytes, bytes]) -> str | None:
-        if metadata.get(RECIPE_KEY, b"").decode() != self.recipe.digest():
-            return "belongs to another recipe"
-        if metadata.get(VERSION_KEY, b"").decode() != SCHEMA_VERSION:
-            return f"has schema version {metadata.get(VERSION_KEY, b'?').decode()}, not {SCHEMA_VERSION}"
-        return None
+    def _is_of_recipe(self, path: Path, metadata: dict[bytes, bytes]) -> bool:
+        """Whether a footer carries the recipe's hash.
+
+        Raises:
+            UserError: its version cannot be read. Nothing is written in the place of such a shard either.
+        """
+        if VERSION_KEY in metadata and _version(metadata) not in READABLE:
+            raise unsupported(path, _version(metadata), READABLE)
+        return metadata.get(RECIPE_KEY, b"").decode() == self.recipe.digest()
 
     def shards(self, table: str) -> list[Path]:
         """Finished shards of a table, in order."""
@@ -149,7 +171,7 @@ class Dataset:
         title = f"# {self.recipe.name}\n\n{self.recipe.description}\n\n{frames} frames. "
         conventions = (
             "Camera axes x right, y down, z forward; pixel centres at integers; lengths in mm; cam_from_obj carries "
-            "object points into the camera frame. Failed rows keep their place with a status and NaN."
+            "object points into the camera frame. Failed rows keep their place with a status and nulls."
         )
         write_text(self.root / CARD_FILE, f"{title}{conventions}\n\n## Tables\n\n{dictionary()}")
 
@@ -162,6 +184,10 @@ class Dataset:
             raise damaged(path) from None
         content = (footer.metadata or {}).get(DIGEST_KEY, b"").decode()
         return {"path": str(path.relative_to(self.root)), "rows": footer.num_rows, "content": content}
+
+
+def _version(metadata: dict[bytes, bytes] | None) -> str:
+    return (metadata or {}).get(VERSION_KEY, b"").decode()
 
 
 def open_dataset(root: Path) -> Dataset:

@@ -34,7 +34,7 @@ def verify(dataset: Dataset) -> tuple[str, list[str]]:
 
 def _shard_problem(dataset: Dataset, path: Path) -> str | None:
     try:
-        rows = dataset.read_shard(path)
+        rows = dataset.stored_rows(path)
         digest = table_digest(rows)
     except UserError as error:
         return str(error)

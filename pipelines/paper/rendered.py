@@ -10,6 +10,7 @@ import pyarrow as pa
 from rich.console import Console
 
 from datasets.recipe.model import load_recipe
+from datasets.rows import numbers
 from datasets.store.claim import claim
 from datasets.store.dataset import Dataset
 from datasets.store.lock import hold
@@ -99,7 +100,7 @@ def _table(scores: pa.Table, cameras: pa.Table, title: str, cell: Callable[[Arra
         ]
     )
     failed = np.array([status != Status.OK for status in scores["status"].to_pylist()])
-    values = np.stack([scores[column].to_numpy() for column in COLUMNS], axis=1)
+    values = numbers(scores, *COLUMNS)
     rows: list[tuple[str, ...]] = []
     for lens in LENSES:
         for setting in SETTINGS:
