@@ -13,11 +13,12 @@ from datasets.schema import COMPONENTS, SCORES
 from datasets.store.dataset import Dataset
 from eposit import Pose, Status
 from eposit.arrays import Array, Mask
-from eposit.pose import euler_error_rad, rotation_error_rad, rotation_error_vector, tilt_rad
+from eposit.pose import euler_error_rad, rotation_error_rad, rotation_error_vector
 from pipelines.stages.failures import failure_reasons
-from render.targets.chessboard import Target
+from render.targets import Target
 
 KEY = ("frame_id", "solver", "point_source", "assumed_camera", "point_set", "noise_draw", "status")
+TRUTH = ["frame_id", *(f"q_{axis}" for axis in "wxyz"), *(f"t_{axis}_mm" for axis in "xyz"), "tilt_deg"]
 GROSS_FAILURE_FACTOR = 2.0  # the paper's star: "at least twice larger than the ground truth"
 
 
@@ -54,9 +55,10 @@ def run_shard(dataset: Dataset, estimates: Path) -> None:
     """Make one shard of `scores`."""
     rows = dataset.read_shard(estimates)
     frames = dataset.sibling(estimates, "frames")
-    truth = dataset.read_shard(frames, ["frame_id", *(f"q_{a}" for a in "wxyz"), *(f"t_{a}_mm" for a in "xyz")])
+    truth = dataset.read_shard(frames, TRUTH)
     place = {frame: i for i, frame in enumerate(truth["frame_id"].to_pylist())}
-    true = poses(truth.take([place[frame] for frame in rows["frame_id"].to_pylist()]))
+    truth = truth.take([place[frame] for frame in rows["frame_id"].to_pylist()])
+    true = poses(truth)
     found = poses(rows)
     t_error = found.t - true.t
     euler = np.degrees(euler_error_rad(found.R, true.R))
@@ -65,6 +67,7 @@ def run_shard(dataset: Dataset, estimates: Path) -> None:
     columns["failure_reason"] = failure_reasons(dataset, estimates, rows)
     scores = {
         **_places(dataset.recipe.target, true),
+        "tilt_deg": truth["tilt_deg"],
         "rotation_error_deg": np.degrees(rotation_error_rad(found.R, true.R)),
         **{f"r{axis}_error_deg": euler[:, i] for i, axis in enumerate("xyz")},
         **{f"t{axis}_error_mm": t_error[:, i] for i, axis in enumerate("xyz")},
@@ -81,12 +84,11 @@ def run_shard(dataset: Dataset, estimates: Path) -> None:
 
 
 def _places(target: Target, true: Pose) -> dict[str, Array]:
-    """Where the board is: of b poses."""
+    """Distance and field angle of the board's centre, of b poses."""
     centre = true.R @ target.board_centre + true.t
     return {
         "distance_mm": np.linalg.norm(centre, axis=1),
         "field_deg": np.degrees(np.arctan2(np.hypot(centre[:, 0], centre[:, 1]), centre[:, 2])),
-        "tilt_deg": np.degrees(tilt_rad(true.R)),
     }
 
 
