@@ -166,6 +166,9 @@ SCORES = pa.schema(
     ]
 )
 
+# Columns by which rows are chosen.
+KEYS = (*(field.name for field in _KEY), "pose_id", "camera_name", "detector", "status")
+
 TABLES: dict[str, pa.Schema] = {
     "frames": FRAMES,
     "keypoints": KEYPOINTS,
@@ -175,13 +178,16 @@ TABLES: dict[str, pa.Schema] = {
 }
 
 
+def meanings(schema: pa.Schema) -> dict[str, str]:
+    """Column to meaning."""
+    return {field.name: (field.metadata or {}).get(MEANING, b"").decode() for field in schema}
+
+
 def dictionary() -> str:
     """The data dictionary as Markdown."""
     lines: list[str] = []
     for name, schema in TABLES.items():
         lines += [f"### {name}", "", "| column | type | meaning |", "|---|---|---|"]
-        for field in schema:
-            meaning = (field.metadata or {}).get(MEANING, b"").decode()
-            lines.append(f"| `{field.name}` | {field.type} | {meaning} |")
+        lines += [f"| `{column}` | {schema.field(column).type} | {text} |" for column, text in meanings(schema).items()]
         lines.append("")
     return "\n".join(lines)

@@ -16,11 +16,13 @@ import pyarrow.parquet as pq
 
 from datasets.errors import UserError
 from datasets.recipe.model import Recipe, load_recipe
-from datasets.schema import SCHEMA_VERSION, TABLES, dictionary
+from datasets.schema import SCHEMA_VERSION, TABLES
 from datasets.store.atomic import replace_atomically, write_text
+from datasets.store.card import card
 from datasets.store.digest import table_digest
 from datasets.store.nulls import with_nulls
 from datasets.store.refusals import SHARD_NAME, damaged, missing, refused, stage_of, unreadable, unsupported
+from datasets.store.shard_file import read_rows, write_rows
 from datasets.store.versions import READABLE, upgraded
 
 RECIPE_FILE = "recipe.toml"
@@ -71,14 +73,10 @@ class Dataset:
             UserError: the disk or its permissions refuse.
         """
         table = with_nulls(rows.cast(TABLES[path.parent.name]))
-        metadata = {
-            RECIPE_KEY: self.recipe.digest().encode(),
-            VERSION_KEY: SCHEMA_VERSION.encode(),
-            DIGEST_KEY: table_digest(table).encode(),
-        }
+        footer = {RECIPE_KEY: self.recipe.digest(), VERSION_KEY: SCHEMA_VERSION, DIGEST_KEY: table_digest(table)}
         try:
             with replace_atomically(path) as temporary:
-                pq.write_table(table.replace_schema_metadata(metadata), temporary, compression="zstd")
+                write_rows(temporary, path.parent.name, table, {key.decode(): value for key, value in footer.items()})
                 pq.read_metadata(temporary)
         except OSError as error:
             raise refused(path, error) from error
@@ -113,10 +111,7 @@ class Dataset:
             UserError: as `read_shard`.
         """
         try:
-            if columns is not None:
-                there = pq.read_schema(path).names
-                columns = [name for name in columns if name in there]
-            table = pq.read_table(path, columns=columns)
+            table = read_rows(path, columns)
         except FileNotFoundError:
             raise missing(path) from None
         except PermissionError:
@@ -168,12 +163,7 @@ class Dataset:
         manifest = {"recipe": self.recipe.digest(), "schema_version": SCHEMA_VERSION, "shards": entries}
         write_text(self.root / MANIFEST_FILE, json.dumps(manifest, indent=1) + "\n")
         frames = sum(entry["rows"] for entry in entries if entry["path"].startswith("frames/"))
-        title = f"# {self.recipe.name}\n\n{self.recipe.description}\n\n{frames} frames. "
-        conventions = (
-            "Camera axes x right, y down, z forward; pixel centres at integers; lengths in mm; cam_from_obj carries "
-            "object points into the camera frame. Failed rows keep their place with a status and nulls."
-        )
-        write_text(self.root / CARD_FILE, f"{title}{conventions}\n\n## Tables\n\n{dictionary()}")
+        write_text(self.root / CARD_FILE, card(self.recipe, frames, [table for table in TABLES if self.shards(table)]))
 
     def _manifest_entry(self, path: Path) -> dict[str, Any]:
         try:
