@@ -136,7 +136,7 @@ SCORES = pa.schema(
         _field(
             "failure_reason",
             pa.string(),
-            "null where the status is ok; for points_missing what the detection says of the points that are missing, or "
+            "null where the status is ok; for points_missing what detection says of the points that are missing, or "
             "beyond_lens where true points have no image; else the status",
         ),
         *_floats(

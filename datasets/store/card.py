@@ -9,13 +9,16 @@ from datasets.schema import dictionary
 
 DEFAULT_TABLE = "frames"  # of `load_dataset(folder)`
 CONVENTIONS = (
-    "Camera axes x right, y down, z forward; pixel centres at integers; lengths in mm; cam_from_obj carries object points "
-    "into the camera frame. Failed rows keep their place with a status and nulls."
+    "Camera axes x right, y down, z forward; pixel centres at integers; lengths in mm; cam_from_obj carries object "
+    "points into the camera frame. Failed rows keep their place with a status and nulls."
 )
 
 
 def card(recipe: Recipe, frames: int, tables: Sequence[str]) -> str:
-    """The card as Markdown behind YAML. tables: those that have shards, as a configuration without files is an error."""
+    """The card as Markdown behind YAML.
+
+    tables: those that have shards, as a configuration without files is an error for who loads any of them.
+    """
     return (
         f"{_configurations(tables)}# {recipe.name}\n\n{recipe.description}\n\n{frames} frames. {CONVENTIONS}\n\n"
         f"## Tables\n\n{dictionary()}"
