@@ -11,15 +11,20 @@ from datasets.recipe.model import Recipe, load_recipe
 from datasets.store.atomic import TEMPORARY_PREFIX, create_text, sweep
 from datasets.store.dataset import RECIPE_FILE, Dataset
 from datasets.store.lock import LOCK_PREFIX, hold
+from datasets.store.provenance import Provenance
 from datasets.store.refusals import refused
 
 
 @contextmanager
-def claim(root: Path, recipe: Recipe, text: str, *, shared: bool = False) -> Iterator[Dataset]:
+def claim(
+    root: Path, recipe: Recipe, text: str, *, shared: bool = False, provenance: Provenance | None = None
+) -> Iterator[Dataset]:
     """Bind a folder to one recipe, so that a second run resumes and another recipe cannot blend in, and hold it.
 
     Of two that claim a new folder at the same moment one succeeds; so does the other if it has the same recipe and both
     are `shared`. The folder is held while the body runs, as `datasets.store.lock` tells.
+
+    provenance: of what the body writes, for the manifest.
 
     Raises:
         UserError: the folder holds another recipe or other files, another process writes it, or it cannot be written.
@@ -33,7 +38,7 @@ def claim(root: Path, recipe: Recipe, text: str, *, shared: bool = False) -> Ite
         if not _check(root, recipe) and not create_text(root / RECIPE_FILE, text):
             _check(root, recipe)
         sweep(root)
-        yield Dataset(root, recipe)
+        yield Dataset(root, recipe, provenance)
 
 
 def _check(root: Path, recipe: Recipe) -> bool:

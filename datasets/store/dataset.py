@@ -6,10 +6,8 @@ carries the recipe's hash and a version of the schema that can be read. Resuming
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -20,15 +18,15 @@ from datasets.schema import SCHEMA_VERSION, TABLES
 from datasets.store.atomic import replace_atomically, write_text
 from datasets.store.card import card
 from datasets.store.digest import table_digest
+from datasets.store.manifest import MANIFEST_FILE, manifest_text, shard_entry
 from datasets.store.nulls import with_nulls
+from datasets.store.provenance import Provenance
 from datasets.store.refusals import SHARD_NAME, damaged, missing, refused, stage_of, unreadable, unsupported
-from datasets.store.shard_file import read_rows, write_rows
+from datasets.store.shard_file import DIGEST_KEY, RECIPE_KEY, VERSION_KEY, read_rows, write_rows
 from datasets.store.versions import READABLE, upgraded
 
 RECIPE_FILE = "recipe.toml"
-MANIFEST_FILE = "manifest.json"
 CARD_FILE = "README.md"
-RECIPE_KEY, VERSION_KEY, DIGEST_KEY = b"recipe", b"schema_version", b"content"
 
 
 @dataclass(frozen=True)
@@ -37,6 +35,7 @@ class Dataset:
 
     root: Path
     recipe: Recipe
+    provenance: Provenance | None = None  # of what is written through this object; None: the manifest does not tell it
 
     def shard_path(self, table: str, index: int, count: int, variant: str = "") -> Path:
         """Path of a shard; `variant` tells kinds of estimates apart."""
@@ -159,29 +158,19 @@ class Dataset:
         Raises:
             UserError: a shard is damaged, or the disk or its permissions refuse.
         """
-        entries = [self._manifest_entry(path) for table in TABLES for path in self.shards(table)]
-        manifest = {"recipe": self.recipe.digest(), "schema_version": SCHEMA_VERSION, "shards": entries}
-        write_text(self.root / MANIFEST_FILE, json.dumps(manifest, indent=1) + "\n")
+        entries = [shard_entry(self.root, path) for table in TABLES for path in self.shards(table)]
+        text = manifest_text(self.root, self.recipe.digest(), entries, self.provenance)
+        write_text(self.root / MANIFEST_FILE, text)
         frames = sum(entry["rows"] for entry in entries if entry["path"].startswith("frames/"))
         write_text(self.root / CARD_FILE, card(self.recipe, frames, [table for table in TABLES if self.shards(table)]))
-
-    def _manifest_entry(self, path: Path) -> dict[str, Any]:
-        try:
-            footer = pq.read_metadata(path)
-        except PermissionError:
-            raise unreadable(path) from None
-        except (pa.ArrowInvalid, OSError):
-            raise damaged(path) from None
-        content = (footer.metadata or {}).get(DIGEST_KEY, b"").decode()
-        return {"path": str(path.relative_to(self.root)), "rows": footer.num_rows, "content": content}
 
 
 def _version(metadata: dict[bytes, bytes] | None) -> str:
     return (metadata or {}).get(VERSION_KEY, b"").decode()
 
 
-def open_dataset(root: Path) -> Dataset:
-    """The dataset in a folder.
+def open_dataset(root: Path, provenance: Provenance | None = None) -> Dataset:
+    """The dataset in a folder. provenance: of what will be written.
 
     Raises:
         UserError: no dataset there.
@@ -189,4 +178,4 @@ def open_dataset(root: Path) -> Dataset:
     path = root / RECIPE_FILE
     if not path.is_file():
         raise UserError(f"{root} holds no dataset ({RECIPE_FILE} is missing); run `generate RECIPE --out {root}` first")
-    return Dataset(root, load_recipe(str(path))[0])
+    return Dataset(root, load_recipe(str(path))[0], provenance)

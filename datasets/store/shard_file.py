@@ -16,6 +16,7 @@ import pyarrow.parquet as pq
 from datasets.schema import KEYS, TABLES, meanings
 from datasets.store.nulls import is_list_of_floats
 
+RECIPE_KEY, VERSION_KEY, DIGEST_KEY = b"recipe", b"schema_version", b"content"
 MEANINGS_KEY = "meanings"  # column name to meaning, JSON
 HUGGINGFACE_KEY = "huggingface"  # which columns are images, as Hugging Face's `datasets` reads it
 

@@ -45,12 +45,13 @@ def begin(
     from datasets.plan import plan
     from datasets.store.claim import claim
     from datasets.store.dataset import open_dataset
+    from pipelines.machine import provenance
 
     loaded, text = load(recipe, regime)
     plan(loaded)
     if reuse is not None:
         open_dataset(reuse)  # before anything is written
-    with claim(out, loaded, text, shared=shared) as dataset:
+    with claim(out, loaded, text, shared=shared, provenance=provenance()) as dataset:
         if reuse is not None:
             from datasets.store.reuse import reuse_linear_images
 
@@ -66,9 +67,11 @@ def writing(folder: Path, *, shared: bool = False) -> Iterator[Dataset]:
     Raises:
         UserError: there is none, or another process writes it.
     """
+    from datasets.store.dataset import open_dataset
     from datasets.store.lock import hold
+    from pipelines.machine import provenance
 
-    dataset = opened(folder)
+    dataset = open_dataset(folder, provenance())
     with hold(folder, shared=shared):
         yield dataset
 

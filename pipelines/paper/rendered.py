@@ -17,6 +17,7 @@ from datasets.store.lock import hold
 from eposit import Status
 from eposit.arrays import Array
 from pipelines.engines.engine import Engine
+from pipelines.machine import provenance
 from pipelines.paper.beyond.field_images import field_of_images
 from pipelines.paper.claims import PaperSection
 from pipelines.paper.simulation import COMPONENTS, LENSES, UNITS
@@ -82,7 +83,7 @@ def pictures(name: str, folder: Path, engine: Engine, tell: Callable[[str], None
     """The dataset of a recipe that comes along, rendered and detected; what is there is kept."""
     recipe, text = load_recipe(name)
     console = Console(quiet=True)
-    with claim(folder, recipe, text) as dataset:
+    with claim(folder, recipe, text, provenance=provenance()) as dataset:
         tell(f"{name}: rendering")
         run_generate(dataset, engine, console)
         tell(f"{name}: detection")
