@@ -9,6 +9,7 @@ import pyarrow.parquet as pq
 from datasets.schema import TABLES
 from datasets.store.digest import table_digest
 from datasets.store.nulls import is_list_of_floats, with_nans
+from datasets.store.shard_file import read_rows
 
 NEW = {"failure_reason", "distance_mm", "field_deg", "tilt_deg"}  # columns of `scores` that version 2 did not have
 
@@ -16,12 +17,12 @@ NEW = {"failure_reason", "distance_mm", "field_deg", "tilt_deg"}  # columns of `
 def make_old(root):
     """Rewrite a dataset's shards: NaN for null, without the new columns, another version in the footer."""
     for table in TABLES:
-        for path in (root / table).iterdir():
+        for path in (root / table).glob("*.parquet"):
             make_shard_old(path)
 
 
 def make_shard_old(path):
-    rows = pq.read_table(path)
+    rows = read_rows(path)
     footer = rows.schema.metadata
     if path.parent.name == "scores":
         rows = rows.select([name for name in rows.column_names if name not in NEW])

@@ -13,6 +13,7 @@ from datasets.store.dataset import RECIPE_FILE, Dataset
 from datasets.store.lock import LOCK_PREFIX, hold
 from datasets.store.provenance import Provenance
 from datasets.store.refusals import refused
+from datasets.store.versions import as_begun
 
 
 @contextmanager
@@ -38,7 +39,7 @@ def claim(
         if not _check(root, recipe) and not create_text(root / RECIPE_FILE, text):
             _check(root, recipe)
         sweep(root)
-        yield Dataset(root, recipe, provenance)
+        yield Dataset(root, as_begun(recipe, root), provenance)
 
 
 def _check(root: Path, recipe: Recipe) -> bool:
@@ -53,6 +54,6 @@ def _check(root: Path, recipe: Recipe) -> bool:
             if others:
                 raise UserError(f"{root} is not empty and holds no dataset; choose a new or empty folder for --out")
             return False
-    if load_recipe(str(path))[0].digest() != recipe.digest():
+    if as_begun(load_recipe(str(path))[0], root).digest() != as_begun(recipe, root).digest():
         raise UserError(f"{root} holds a dataset of another recipe; choose another --out or delete it")
     return True

@@ -23,7 +23,7 @@ from datasets.store.nulls import with_nulls
 from datasets.store.provenance import Provenance
 from datasets.store.refusals import SHARD_NAME, damaged, missing, refused, stage_of, unreadable, unsupported
 from datasets.store.shard_file import DIGEST_KEY, RECIPE_KEY, VERSION_KEY, read_rows, write_rows
-from datasets.store.versions import READABLE, upgraded
+from datasets.store.versions import READABLE, as_begun, upgraded
 
 RECIPE_FILE = "recipe.toml"
 CARD_FILE = "README.md"
@@ -178,4 +178,4 @@ def open_dataset(root: Path, provenance: Provenance | None = None) -> Dataset:
     path = root / RECIPE_FILE
     if not path.is_file():
         raise UserError(f"{root} holds no dataset ({RECIPE_FILE} is missing); run `generate RECIPE --out {root}` first")
-    return Dataset(root, load_recipe(str(path))[0], provenance)
+    return Dataset(root, as_begun(load_recipe(str(path))[0], root), provenance)

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from pathlib import Path
+
 import pyarrow as pa
 import pyarrow.compute as pc
+import pyarrow.parquet as pq
 
+from datasets.recipe.model import Recipe
 from datasets.schema import SCHEMA_VERSION, TABLES
 from datasets.store.nulls import with_nulls
+from datasets.store.shard_file import RECIPE_KEY
 
 NAN_VERSION = "2"  # had NaN for every null, and `scores` without what `SCORES_ADDED` names
 READABLE = (NAN_VERSION, SCHEMA_VERSION)
@@ -25,6 +31,28 @@ def upgraded(rows: pa.Table, table: str) -> pa.Table:
         known = name == "failure_reason" and "status" in rows.column_names
         rows = rows.append_column(field, _reasons(rows) if known else pa.nulls(rows.num_rows, field.type))
     return rows
+
+
+def as_begun(recipe: Recipe, root: Path) -> Recipe:
+    """A recipe as a folder's shards were made, if there are any: one without `shard_frames` meant 10 in version 2.
+
+    The footers tell: they carry the hash of the recipe with the number that was meant.
+    """
+    if recipe.shard_frames is not None:
+        return recipe
+    old = recipe.model_copy(update={"shard_frames": OLD_SHARD_FRAMES})
+    return old if old.digest() in _carried(root) else recipe
+
+
+def _carried(root: Path) -> Iterator[str]:
+    """Hashes of recipes that a folder's shards carry, one of each table."""
+    for table in TABLES:
+        for path in sorted((root / table).glob("[!.]*.parquet")):
+            try:
+                yield (pq.read_metadata(path).metadata or {}).get(RECIPE_KEY, b"").decode()
+                break
+            except (OSError, pa.ArrowInvalid):
+                continue  # whoever reads the rows says what is wrong with it
 
 
 def _reasons(rows: pa.Table) -> pa.ChunkedArray:

@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 
 from datasets.errors import UserError
-from datasets.plan import Frame, plan, shard_count
+from datasets.plan import Frame, frames_of_shard, shard_count
 from datasets.recipe.model import Recipe
 from datasets.rows import pose_columns, table
 from datasets.schema import FRAMES, KEYPOINTS
@@ -29,7 +29,7 @@ def is_done(dataset: Dataset, index: int) -> bool:
     count = shard_count(dataset.recipe)
     if not all(dataset.is_done(dataset.shard_path(name, index, count)) for name in ("frames", "keypoints")):
         return False
-    return all((dataset.root / linear_path(frame)).is_file() for frame in _frames(dataset.recipe, index))
+    return all((dataset.root / linear_path(frame)).is_file() for frame in frames_of_shard(dataset.recipe, index))
 
 
 def run_shard(dataset: Dataset, index: int, advance: Callable[[], None] = lambda: None) -> None:
@@ -38,16 +38,12 @@ def run_shard(dataset: Dataset, index: int, advance: Callable[[], None] = lambda
     advance: called after each frame.
     """
     recipe = dataset.recipe
-    count, chosen = shard_count(recipe), _frames(recipe, index)
+    count, chosen = shard_count(recipe), frames_of_shard(recipe, index)
     makers = (functools.partial(_finish, dataset, frame, *_light(dataset, frame)) for frame in chosen)
     rows = list(overlapped(makers, advance))
     truth = pa.concat_tables(_keypoints(recipe, frame) for frame in chosen)
     dataset.write_shard(dataset.shard_path("keypoints", index, count), truth)
     dataset.write_shard(dataset.shard_path("frames", index, count), pa.Table.from_pylist(rows, schema=FRAMES))
-
-
-def _frames(recipe: Recipe, index: int) -> tuple[Frame, ...]:
-    return plan(recipe)[index * recipe.shard_frames : (index + 1) * recipe.shard_frames]
 
 
 def _light(dataset: Dataset, frame: Frame) -> tuple[LinearImage, bool]:

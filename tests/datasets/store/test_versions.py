@@ -104,6 +104,38 @@ def test_a_changed_value_in_an_old_shard_is_found(both, cli):
     assert_one_sentence(done.code, done.err, "do not match the hash")
 
 
+@pytest.fixture
+def old_default(place, cli, monkeypatch):
+    """A recipe without `shard_frames`, and its dataset as version 2 began it: ten frames in a shard."""
+    text = place.text.replace("shard_frames = 1\n", "")
+    given = place.recipe(place.text.replace("shard_frames = 1", "shard_frames = 10"))
+    root = place.new()
+    assert cli("generate", given, "--out", root, "--reuse", place.source, "-q").code == 0
+    (root / "recipe.toml").write_text(text)
+    make_old(root)
+    monkeypatch.setattr("datasets.plan.LEAST_SHARD_FRAMES", 1)  # today's default cuts two frames into two shards
+    return place.recipe(text), root
+
+
+def test_a_recipe_that_relied_on_the_old_default_goes_on(old_default, cli, tmp_path):
+    recipe, root = old_default
+    before = shards(root)
+    assert len(before) == 2
+    assert cli("verify", root).code == 0
+    assert "all 1 shards are there" in cli("generate", recipe, "--out", root).out
+    assert cli("detect", root, "-q").code == 0
+    first(root, "keypoints").unlink()
+    assert cli("generate", recipe, "--out", root, "-q").code == 0
+    names = sorted(path.name for path in shards(root))
+    assert names == [f"{table}-00000-of-00001.parquet" for table in ("detections", "frames", "keypoints")]
+    first(root, "frames").write_bytes(b"")  # the other tables still tell
+    assert cli("generate", recipe, "--out", root, "-q").code == 0
+    assert cli("verify", root).code == 0
+    assert sorted(path.name for path in shards(root)) == names
+    assert cli("generate", recipe, "--out", tmp_path / "begun", "--reuse", root, "-q").code == 0
+    assert len(shards(tmp_path / "begun")) == 4
+
+
 @pytest.mark.parametrize("table", TABLES)
 def test_a_version_that_is_not_known_is_one_sentence_and_stays(table, place, cli):
     root = place.dataset()
