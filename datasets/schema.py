@@ -66,7 +66,7 @@ FRAMES = pa.schema(
         )),
         _field("render_seed", pa.int64(), "seed of a path-traced reference; the picture has no random numbers"),
         _field("sensor_seed", pa.int64(), "seed of the noise and of the light's direction"),
-        _field("master", pa.string(), "path of the linear-light EXR within the dataset"),
+        _field("master", pa.string(), "path of the linear-light EXR within the dataset, where these are kept"),
     ]
 )  # fmt: skip
 

@@ -14,13 +14,15 @@ CONVENTIONS = (
 )
 
 
-def card(recipe: Recipe, frames: int, tables: Sequence[str]) -> str:
+def card(recipe: Recipe, frames: int, tables: Sequence[str], *, with_masters: bool) -> str:
     """The card as Markdown behind YAML.
 
     tables: those that have shards, as a configuration without files is an error for who loads any of them.
+    with_masters: whether linear images are kept.
     """
+    note = "" if with_masters else " Linear images were not kept: `master` names files that are not there."
     return (
-        f"{_configurations(tables)}# {recipe.name}\n\n{recipe.description}\n\n{frames} frames. {CONVENTIONS}\n\n"
+        f"{_configurations(tables)}# {recipe.name}\n\n{recipe.description}\n\n{frames} frames. {CONVENTIONS}{note}\n\n"
         f"## Tables\n\n{dictionary()}"
     )
 

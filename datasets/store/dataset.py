@@ -18,6 +18,7 @@ from datasets.schema import SCHEMA_VERSION, TABLES
 from datasets.store.atomic import replace_atomically, write_text
 from datasets.store.card import card
 from datasets.store.digest import table_digest
+from datasets.store.linear_images import are_kept
 from datasets.store.manifest import MANIFEST_FILE, manifest_text, shard_entry
 from datasets.store.nulls import with_nulls
 from datasets.store.provenance import Provenance
@@ -162,7 +163,8 @@ class Dataset:
         text = manifest_text(self.root, self.recipe.digest(), entries, self.provenance)
         write_text(self.root / MANIFEST_FILE, text)
         frames = sum(entry["rows"] for entry in entries if entry["path"].startswith("frames/"))
-        write_text(self.root / CARD_FILE, card(self.recipe, frames, [table for table in TABLES if self.shards(table)]))
+        tables = [table for table in TABLES if self.shards(table)]
+        write_text(self.root / CARD_FILE, card(self.recipe, frames, tables, with_masters=are_kept(self.root)))
 
 
 def _version(metadata: dict[bytes, bytes] | None) -> str:

@@ -9,7 +9,7 @@ from datasets.plan import shard_count
 from datasets.schema import TABLES
 from datasets.store.dataset import Dataset
 from datasets.store.digest import table_digest
-from datasets.store.linear_images import LinearImageError, masters, read_linear
+from datasets.store.linear_images import LinearImageError, are_kept, masters, read_linear
 from datasets.store.manifest import Entry, content_of, shard_entry
 from datasets.store.refusals import stage_of
 from datasets.store.shard_file import DIGEST_KEY
@@ -54,6 +54,8 @@ def _missing(dataset: Dataset) -> list[str]:
 
 def _masters(dataset: Dataset) -> list[str]:
     problems: list[str] = []
+    if not are_kept(dataset.root):
+        return problems
     for path, key in masters(dataset.root, dataset.recipe):
         try:
             read_linear(path, key)
