@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from eposit.arrays import Array
 
@@ -14,13 +13,12 @@ from eposit.arrays import Array
 def with_nulls(rows: pa.Table) -> pa.Table:
     """The same rows with null for every NaN, and for a list of NaN alone."""
     for i, field in enumerate(rows.schema):
-        column = rows.column(i).combine_chunks()
         if pa.types.is_floating(field.type):
-            rows = rows.set_column(i, field, _null_where_nan(column))
+            rows = rows.set_column(i, field, _null_where_nan(with_nans(rows.column(i)), field.type))
         elif is_list_of_floats(field.type):
-            nothing = np.isnan(with_nans(column)).all(axis=1)
-            values = _null_where_nan(pa.array(with_nans(column).ravel(), field.type.value_type))
-            lists = pa.FixedSizeListArray.from_arrays(values, type=field.type, mask=pa.array(nothing))
+            values = with_nans(rows.column(i))
+            flat, nothing = _null_where_nan(values.ravel(), field.type.value_type), np.isnan(values).all(axis=1)
+            lists = pa.FixedSizeListArray.from_arrays(flat, type=field.type, mask=pa.array(nothing))
             rows = rows.set_column(i, field, lists)
     return rows
 
@@ -41,5 +39,5 @@ def is_list_of_floats(kind: pa.DataType) -> bool:
     return pa.types.is_fixed_size_list(kind) and pa.types.is_floating(kind.value_type)
 
 
-def _null_where_nan(column: Any) -> Any:
-    return pc.if_else(pc.is_nan(column), pa.scalar(None, column.type), column)
+def _null_where_nan(values: Array, kind: pa.DataType) -> pa.Array:
+    return pa.array(values, type=kind, mask=np.isnan(values))

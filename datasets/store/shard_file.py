@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -28,15 +29,13 @@ def write_rows(path: Path, table: str, rows: pa.Table, footer: dict[str, str]) -
         OSError: the system refuses.
     """
     schema = TABLES[table]
-    texts = [field.name for field in schema if pa.types.is_string(field.type)]
-    with pq.ParquetWriter(
-        path,
-        schema.remove_metadata(),
-        compression="zstd",
-        use_dictionary=texts,
-        write_statistics=[name for name in schema.names if name in KEYS],
-        store_schema=False,
-    ) as writer:
+    options: dict[str, Any] = {
+        "compression": "zstd",
+        "use_dictionary": [field.name for field in schema if pa.types.is_string(field.type)],
+        "write_statistics": [name for name in schema.names if name in KEYS],
+        "store_schema": False,
+    }
+    with pq.ParquetWriter(path, schema.remove_metadata(), **options) as writer:
         writer.write_table(rows)
         writer.add_key_value_metadata(footer | _described(schema))
 
