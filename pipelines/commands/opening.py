@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -92,6 +93,7 @@ def complete_manifest(dataset: Dataset) -> None:
         UserError: a shard is damaged, or the folder cannot be written.
     """
     from datasets.store.lock import HeldError, hold
+    from pipelines.machine import provenance
 
     with ExitStack() as stack:
         try:
@@ -99,7 +101,7 @@ def complete_manifest(dataset: Dataset) -> None:
         except HeldError as error:
             print(f"the manifest stays as it is, as {error}", file=sys.stderr)
             return
-        dataset.write_manifest()
+        replace(dataset, provenance=provenance()).write_manifest()
 
 
 def opened(folder: Path) -> Dataset:
