@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from datasets.errors import UserError
 from datasets.schema import ESTIMATES
 from datasets.store.images import decode_png
+from datasets.store.nulls import with_nans
 from eposit import Camera, Pose, Solution
 from eposit.arrays import Array
 from render.targets import Target
@@ -61,15 +62,25 @@ def estimate_rows(
     return table(ESTIMATES, columns)
 
 
+def numbers(rows: pa.Table, *names: str) -> Array:
+    """(n, k) values of k columns of floats; nulls are NaN."""
+    return np.stack([with_nans(rows[name]) for name in names], axis=1)
+
+
 def poses(rows: pa.Table) -> Pose:
-    """(b,) poses from quaternion and position columns; NaN rows stay NaN."""
-    quaternion = np.stack([rows[f"q_{axis}"].to_numpy() for axis in "wxyz"], axis=1)
-    t = np.stack([rows[f"t_{axis}_mm"].to_numpy() for axis in "xyz"], axis=1)
+    """(b,) poses from quaternion and position columns; rows without a pose are NaN."""
+    quaternion = numbers(rows, *(f"q_{axis}" for axis in "wxyz"))
+    t = numbers(rows, *(f"t_{axis}_mm" for axis in "xyz"))
     finite = np.all(np.isfinite(quaternion), axis=1)
     R = np.full((len(t), 3, 3), np.nan)
     if np.any(finite):
         R[finite] = Pose.from_quaternion(quaternion[finite], t[finite]).R
     return Pose(R, t)
+
+
+def pose_covariances(rows: pa.Table) -> Array:
+    """(b, 6, 6) of rows of `estimates`, NaN where none is stated."""
+    return with_nans(rows["covariance"]).reshape(-1, 6, 6)
 
 
 def camera_of(row: dict[str, Any]) -> Camera:
@@ -103,17 +114,16 @@ def of_detector(detections: pa.Table, detector: str) -> pa.Table:
 
 
 def covariances_by_frame(rows: pa.Table, target: Target) -> dict[int, Array]:
-    """frame_id to (n, 2, 2) px^2 from rows of `detections`."""
+    """frame_id to (n, 2, 2) px^2 from rows of `detections`; NaN where a point was not found."""
     count = len(target.points)
-    xx, xy, yy = (rows[name].to_numpy() for name in ("var_x_px2", "cov_xy_px2", "var_y_px2"))
-    found = np.stack((xx, xy, xy, yy), axis=1).reshape(-1, count, 2, 2)
+    found = numbers(rows, "var_x_px2", "cov_xy_px2", "cov_xy_px2", "var_y_px2").reshape(-1, count, 2, 2)
     frame = rows["frame_id"].to_numpy()
     return {int(frame[i * count]): found[i] for i in range(len(found))}
 
 
 def points_by_frame(rows: pa.Table, target: Target) -> dict[int, Array]:
-    """frame_id to (n, 2) px from a long table of points."""
+    """frame_id to (n, 2) px from a long table of points; NaN where there is none."""
     count = len(target.points)
     frame = rows["frame_id"].to_numpy()
-    pixels = np.stack([rows["x_px"].to_numpy(), rows["y_px"].to_numpy()], axis=1).reshape(-1, count, 2)
+    pixels = numbers(rows, "x_px", "y_px").reshape(-1, count, 2)
     return {int(frame[i * count]): pixels[i] for i in range(len(pixels))}

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pyarrow as pa
 
-SCHEMA_VERSION = "2"
+SCHEMA_VERSION = "3"
 MEANING = b"meaning"
 
-_STATUS = "ok, or the reason of failure; a failed row keeps its place with NaN"
+_STATUS = "ok, or the reason of failure; a failed row keeps its place with nulls"
 
 
 def _field(name: str, kind: pa.DataType, meaning: str) -> pa.Field:
@@ -66,7 +66,7 @@ FRAMES = pa.schema(
         )),
         _field("render_seed", pa.int64(), "seed of a path-traced reference; the picture has no random numbers"),
         _field("sensor_seed", pa.int64(), "seed of the noise and of the light's direction"),
-        _field("master", pa.string(), "path of the linear-light EXR within the dataset"),
+        _field("master", pa.string(), "path of the linear-light EXR within the dataset, where these are kept"),
     ]
 )  # fmt: skip
 
@@ -79,8 +79,8 @@ KEYPOINTS = pa.schema(
                 "x_obj_mm": "x in the object frame",
                 "y_obj_mm": "y in the object frame",
                 "z_obj_mm": "z in the object frame, into the board",
-                "x_px": "true image of the point; NaN beyond the lens",
-                "y_px": "true image of the point; NaN beyond the lens",
+                "x_px": "true image of the point; null beyond the lens",
+                "y_px": "true image of the point; null beyond the lens",
                 "x_outline_px": "centroid of the projected outline: of the circle; a corner's is the corner",
                 "y_outline_px": "centroid of the projected outline: of the circle; a corner's is the corner",
                 "theta_deg": "incidence angle",
@@ -121,7 +121,7 @@ ESTIMATES = pa.schema(
         _field(
             "covariance",
             pa.list_(pa.field("element", pa.float64()), 36),
-            "6 x 6, row by row: rotation vector on the left in the camera frame, rad; then t, mm. NaN: none stated",
+            "6 x 6, row by row: rotation vector on the left in the camera frame, rad; then t, mm. Null: none stated",
         ),
     ]
 )
@@ -133,8 +133,17 @@ SCORES = pa.schema(
     [
         *_KEY,
         _field("status", pa.string(), _STATUS),
+        _field(
+            "failure_reason",
+            pa.string(),
+            "null where the status is ok; for points_missing what detection says of the points that are missing, or "
+            "beyond_lens where true points have no image; else the status",
+        ),
         *_floats(
             {
+                "distance_mm": "true distance of the board's centre from the camera",
+                "field_deg": "true angle of the board's centre from the optical axis",
+                "tilt_deg": "true angle between the board's normal and the optical axis",
                 "rotation_error_deg": "angle between estimated and true rotation",
                 "rx_error_deg": "estimate minus truth about x, R = Rz Ry Rx",
                 "ry_error_deg": "estimate minus truth about y",
@@ -157,6 +166,9 @@ SCORES = pa.schema(
     ]
 )
 
+# Columns by which rows are chosen.
+KEYS = (*(field.name for field in _KEY), "pose_id", "camera_name", "detector", "status")
+
 TABLES: dict[str, pa.Schema] = {
     "frames": FRAMES,
     "keypoints": KEYPOINTS,
@@ -166,13 +178,16 @@ TABLES: dict[str, pa.Schema] = {
 }
 
 
+def meanings(schema: pa.Schema) -> dict[str, str]:
+    """Column to meaning."""
+    return {field.name: (field.metadata or {}).get(MEANING, b"").decode() for field in schema}
+
+
 def dictionary() -> str:
     """The data dictionary as Markdown."""
     lines: list[str] = []
     for name, schema in TABLES.items():
         lines += [f"### {name}", "", "| column | type | meaning |", "|---|---|---|"]
-        for field in schema:
-            meaning = (field.metadata or {}).get(MEANING, b"").decode()
-            lines.append(f"| `{field.name}` | {field.type} | {meaning} |")
+        lines += [f"| `{column}` | {schema.field(column).type} | {text} |" for column, text in meanings(schema).items()]
         lines.append("")
     return "\n".join(lines)

@@ -1,5 +1,6 @@
 """A dataset's tables and pictures with pyarrow alone: python examples/read_dataset.py out/demo."""
 
+import json
 import sys
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,7 +14,7 @@ frames = pq.read_table(root / "frames", columns=["frame_id", "camera_name", "len
 print(f"{frames.num_rows} pictures; the first is {len(frames['image'][0]['bytes'].as_py())} bytes of PNG")
 
 scores = pq.read_table(root / "scores")
-print("a column's meaning:", scores.schema.field("gross_failure").metadata[b"meaning"].decode())
+print("a column's meaning:", json.loads(scores.schema.metadata[b"meanings"])["gross_failure"])
 good = scores.filter(pc.field("status") == "ok").join(frames.drop_columns("image"), "frame_id")
 for row in good.group_by(["solver", "lens"]).aggregate([("t_error_relative", "mean")]).to_pylist():
     print(f"{row['solver']:>12} {row['lens']:<14} mean error {row['t_error_relative_mean']:.1e} of the distance")

@@ -6,8 +6,12 @@ import datetime
 import importlib.metadata
 import os
 import platform
+import subprocess
 from pathlib import Path
 
+from datasets.store.provenance import Provenance
+
+GIT_S = 10.0  # what git may take before the commit counts as unknown
 LIBRARIES = (
     "numpy", "scipy", "numba", "mitsuba", "drjit", "opencv-python-headless", "OpenEXR", "pyarrow", "poselib",
 )  # fmt: skip
@@ -27,6 +31,45 @@ def versions() -> str:
     """Libraries and machine in one line."""
     found = ", ".join(f"{name} {version_of(name) or 'not installed'}" for name in LIBRARIES)
     return f"Python {platform.python_version()}, {found}; {_system()}"
+
+
+def provenance() -> Provenance:
+    """What the manifest of a dataset says of this environment."""
+    return Provenance(
+        commit=commit(),
+        date=datetime.date.today().isoformat(),
+        python=platform.python_version(),
+        libraries=tuple((name, version_of(name) or "not installed") for name in LIBRARIES),
+        processor=f"{_processor()}, {platform.system()} {platform.machine()}",
+        blas=blas(),
+    )
+
+
+def commit() -> str:
+    """The commit of this checkout, `with changes` behind it if files differ from it; unknown without git."""
+    try:
+        found = _git("rev-parse", "HEAD")
+        return f"{found} with changes" if _git("status", "--porcelain", "--untracked-files=no") else found
+    except (OSError, subprocess.SubprocessError):
+        return "unknown"
+
+
+def _git(*words: str) -> str:
+    command = ["git", "-C", str(Path(__file__).parents[1]), *words]
+    return subprocess.run(command, check=True, capture_output=True, text=True, timeout=GIT_S).stdout.strip()
+
+
+def blas() -> str:
+    """Name, version and kernel of NumPy's and SciPy's linear algebra: the kernel decides the last bits of a product."""
+    import scipy.linalg  # noqa: F401  both libraries are then loaded, whatever was before
+    from threadpoolctl import threadpool_info
+
+    found = {
+        " ".join(str(pool[key]) for key in ("internal_api", "version", "architecture") if pool.get(key))
+        for pool in threadpool_info()
+        if pool["user_api"] == "blas"
+    }
+    return ", ".join(sorted(found)) or "unknown"
 
 
 def version_of(library: str) -> str | None:

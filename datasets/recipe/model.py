@@ -44,7 +44,14 @@ class Recipe(BaseModel):
             ge=1, le=65536, description="cells of a pixel where edges meet, a square number; the quality's if left out"
         ),
     ] = None
-    shard_frames: Annotated[int, Field(ge=1, le=10000, description="frames in one shard")] = 10
+    shard_frames: Annotated[
+        int | None,
+        Field(
+            ge=1,
+            le=10000,
+            description="frames in one shard; a sixteenth of all, at least 10 and at most 200, if left out",
+        ),
+    ] = None
     allow_cropped: Annotated[bool, Field(description="whether target points may lie outside the image")] = False
     four: Annotated[
         tuple[tuple[int, int] | str, ...] | None,

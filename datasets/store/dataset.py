@@ -1,30 +1,33 @@
 """A dataset on disk: atomic Parquet shards, bound to one recipe, resumable, verifiable.
 
 A shard is written to a temporary name, flushed, checked and renamed; it is valid if it can be read and its footer
-carries the recipe's hash and the schema's version. Resuming is doing what is not there.
+carries the recipe's hash and a version of the schema that can be read. Resuming is doing what is not there.
 """
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from datasets.errors import UserError
 from datasets.recipe.model import Recipe, load_recipe
-from datasets.schema import SCHEMA_VERSION, TABLES, dictionary
+from datasets.schema import SCHEMA_VERSION, TABLES
 from datasets.store.atomic import replace_atomically, write_text
+from datasets.store.card import card
 from datasets.store.digest import table_digest
-from datasets.store.refusals import SHARD_NAME, damaged, missing, refused, stage_of, unreadable
+from datasets.store.linear_images import are_kept
+from datasets.store.manifest import MANIFEST_FILE, manifest_text, shard_entry
+from datasets.store.nulls import with_nulls
+from datasets.store.provenance import Provenance
+from datasets.store.refusals import SHARD_NAME, damaged, missing, refused, stage_of, unreadable, unsupported
+from datasets.store.shard_file import DIGEST_KEY, RECIPE_KEY, VERSION_KEY, read_rows, write_rows
+from datasets.store.versions import READABLE, as_begun, upgraded
 
 RECIPE_FILE = "recipe.toml"
-MANIFEST_FILE = "manifest.json"
 CARD_FILE = "README.md"
-RECIPE_KEY, VERSION_KEY, DIGEST_KEY = b"recipe", b"schema_version", b"content"
 
 
 @dataclass(frozen=True)
@@ -33,6 +36,7 @@ class Dataset:
 
     root: Path
     recipe: Recipe
+    provenance: Provenance | None = None  # of what is written through this object; None: the manifest does not tell it
 
     def shard_path(self, table: str, index: int, count: int, variant: str = "") -> Path:
         """Path of a shard; `variant` tells kinds of estimates apart."""
@@ -42,17 +46,21 @@ class Dataset:
         """The number of a shard."""
         return int(path.stem.rsplit("-", 3)[1])
 
-    def sibling(self, path: Path, table: str) -> Path:
+    def sibling(self, path: Path, table: str, variant: str = "") -> Path:
         """The shard of another table over the same frames."""
         count = int(path.stem.rsplit("-", 1)[1])
-        return self.shard_path(table, self.index_of(path), count)
+        return self.shard_path(table, self.index_of(path), count, variant)
 
     def is_done(self, path: Path) -> bool:
-        """Whether a valid shard of this recipe is there."""
+        """Whether a valid shard of this recipe is there.
+
+        Raises:
+            UserError: it may not be read, or its version cannot be.
+        """
         if not path.is_file():
             return False
         try:
-            return self._footer_problem(pq.read_metadata(path).metadata or {}) is None
+            return self._is_of_recipe(path, pq.read_metadata(path).metadata or {})
         except PermissionError:
             raise unreadable(path) from None
         except (pa.ArrowInvalid, OSError):
@@ -64,16 +72,11 @@ class Dataset:
         Raises:
             UserError: the disk or its permissions refuse.
         """
-        schema = TABLES[path.parent.name]
-        table = rows.cast(schema)
-        metadata = {
-            RECIPE_KEY: self.recipe.digest().encode(),
-            VERSION_KEY: SCHEMA_VERSION.encode(),
-            DIGEST_KEY: table_digest(table).encode(),
-        }
+        table = with_nulls(rows.cast(TABLES[path.parent.name]))
+        footer = {RECIPE_KEY: self.recipe.digest(), VERSION_KEY: SCHEMA_VERSION, DIGEST_KEY: table_digest(table)}
         try:
             with replace_atomically(path) as temporary:
-                pq.write_table(table.replace_schema_metadata(metadata), temporary, compression="zstd")
+                write_rows(temporary, path.parent.name, table, {key.decode(): value for key, value in footer.items()})
                 pq.read_metadata(temporary)
         except OSError as error:
             raise refused(path, error) from error
@@ -90,30 +93,44 @@ class Dataset:
             raise refused(path, error) from error
 
     def read_shard(self, path: Path, columns: list[str] | None = None) -> pa.Table:
-        """The rows of one shard, or some columns of them.
+        """The rows of one shard, or some columns of them; those of an earlier version of the schema in today's form.
 
         Raises:
-            UserError: missing, unreadable, truncated, of another recipe or of another schema version.
+            UserError: missing, unreadable, truncated, of another recipe or of a version that cannot be read.
+        """
+        rows = self.stored_rows(path, columns)
+        if _version(rows.schema.metadata) == SCHEMA_VERSION:
+            return rows
+        name = path.parent.name
+        return upgraded(rows, name).select(columns or TABLES[name].names)
+
+    def stored_rows(self, path: Path, columns: list[str] | None = None) -> pa.Table:
+        """The rows of one shard as they lie in its file, or those of some columns that are there.
+
+        Raises:
+            UserError: as `read_shard`.
         """
         try:
-            table = pq.read_table(path, columns=columns)
+            table = read_rows(path, columns)
         except FileNotFoundError:
             raise missing(path) from None
         except PermissionError:
             raise unreadable(path) from None
         except (pa.ArrowInvalid, OSError):
             raise damaged(path) from None
-        problem = self._footer_problem(table.schema.metadata or {})
-        if problem:
-            raise UserError(f"{path} {problem}; delete it and run the {stage_of(path)} stage again")
+        if not self._is_of_recipe(path, table.schema.metadata or {}):
+            raise UserError(f"{path} belongs to another recipe; delete it and run the {stage_of(path)} stage again")
         return table
 
-    def _footer_problem(self, metadata: dict[bytes, bytes]) -> str | None:
-        if metadata.get(RECIPE_KEY, b"").decode() != self.recipe.digest():
-            return "belongs to another recipe"
-        if metadata.get(VERSION_KEY, b"").decode() != SCHEMA_VERSION:
-            return f"has schema version {metadata.get(VERSION_KEY, b'?').decode()}, not {SCHEMA_VERSION}"
-        return None
+    def _is_of_recipe(self, path: Path, metadata: dict[bytes, bytes]) -> bool:
+        """Whether a footer carries the recipe's hash.
+
+        Raises:
+            UserError: its version cannot be read. Nothing is written in the place of such a shard either.
+        """
+        if VERSION_KEY in metadata and _version(metadata) not in READABLE:
+            raise unsupported(path, _version(metadata), READABLE)
+        return metadata.get(RECIPE_KEY, b"").decode() == self.recipe.digest()
 
     def shards(self, table: str) -> list[Path]:
         """Finished shards of a table, in order."""
@@ -142,30 +159,20 @@ class Dataset:
         Raises:
             UserError: a shard is damaged, or the disk or its permissions refuse.
         """
-        entries = [self._manifest_entry(path) for table in TABLES for path in self.shards(table)]
-        manifest = {"recipe": self.recipe.digest(), "schema_version": SCHEMA_VERSION, "shards": entries}
-        write_text(self.root / MANIFEST_FILE, json.dumps(manifest, indent=1) + "\n")
+        entries = [shard_entry(self.root, path) for table in TABLES for path in self.shards(table)]
+        text = manifest_text(self.root, self.recipe.digest(), entries, self.provenance)
+        write_text(self.root / MANIFEST_FILE, text)
         frames = sum(entry["rows"] for entry in entries if entry["path"].startswith("frames/"))
-        title = f"# {self.recipe.name}\n\n{self.recipe.description}\n\n{frames} frames. "
-        conventions = (
-            "Camera axes x right, y down, z forward; pixel centres at integers; lengths in mm; cam_from_obj carries "
-            "object points into the camera frame. Failed rows keep their place with a status and NaN."
-        )
-        write_text(self.root / CARD_FILE, f"{title}{conventions}\n\n## Tables\n\n{dictionary()}")
-
-    def _manifest_entry(self, path: Path) -> dict[str, Any]:
-        try:
-            footer = pq.read_metadata(path)
-        except PermissionError:
-            raise unreadable(path) from None
-        except (pa.ArrowInvalid, OSError):
-            raise damaged(path) from None
-        content = (footer.metadata or {}).get(DIGEST_KEY, b"").decode()
-        return {"path": str(path.relative_to(self.root)), "rows": footer.num_rows, "content": content}
+        tables = [table for table in TABLES if self.shards(table)]
+        write_text(self.root / CARD_FILE, card(self.recipe, frames, tables, with_masters=are_kept(self.root)))
 
 
-def open_dataset(root: Path) -> Dataset:
-    """The dataset in a folder.
+def _version(metadata: dict[bytes, bytes] | None) -> str:
+    return (metadata or {}).get(VERSION_KEY, b"").decode()
+
+
+def open_dataset(root: Path, provenance: Provenance | None = None) -> Dataset:
+    """The dataset in a folder. provenance: of what will be written.
 
     Raises:
         UserError: no dataset there.
@@ -173,4 +180,4 @@ def open_dataset(root: Path) -> Dataset:
     path = root / RECIPE_FILE
     if not path.is_file():
         raise UserError(f"{root} holds no dataset ({RECIPE_FILE} is missing); run `generate RECIPE --out {root}` first")
-    return Dataset(root, load_recipe(str(path))[0])
+    return Dataset(root, as_begun(load_recipe(str(path))[0], root), provenance)

@@ -13,14 +13,20 @@ from pathlib import Path
 
 import numpy as np
 
+from datasets.errors import UserError
 from datasets.plan import Frame, plan
 from datasets.recipe.model import Recipe
-from datasets.store.atomic import replace_atomically
+from datasets.store.atomic import replace_atomically, write_text
 from eposit import Camera
 from render.frame import LinearImage
 from render.targets.image_region import Region
 
 MASTERS = "masters"  # their folder
+NOT_KEPT = "masters-not-kept.txt"  # lies in the folder of a dataset that does not keep them
+NOT_KEPT_TEXT = """\
+This dataset was made with --no-masters: its linear images are rendered, developed and not kept.
+Another regime needs them, and so does `--reuse`: make the dataset in another folder without --no-masters.
+"""
 
 
 class LinearImageError(ValueError):
@@ -90,6 +96,36 @@ def _silent_library() -> Iterator[None]:
     finally:
         os.dup2(kept, 2)
         os.close(kept)
+
+
+def are_kept(root: Path) -> bool:
+    """Whether a dataset keeps its linear images."""
+    return not (root / NOT_KEPT).exists()
+
+
+def require_kept(root: Path, what: str) -> None:
+    """Refuse a dataset that does not keep its linear images. what: the option or command that needs them.
+
+    Raises:
+        UserError: it was made with --no-masters.
+    """
+    if not are_kept(root):
+        raise UserError(
+            f"{what}: {root} was made with --no-masters and has no linear images; give a dataset that keeps them"
+        )
+
+
+def settle_kept(root: Path, *, keep: bool) -> None:
+    """Note in a dataset's folder that linear images are not kept, unless `keep`; who resumes need not say it again.
+
+    Raises:
+        UserError: the dataset has begun with linear images, or the folder cannot be written.
+    """
+    if keep or not are_kept(root):
+        return
+    if any((root / MASTERS).glob("*.exr")) or any((root / "frames").glob("[!.]*.parquet")):
+        raise UserError(f"{root} keeps its linear images; leave out --no-masters, or choose another --out")
+    write_text(root / NOT_KEPT, NOT_KEPT_TEXT)
 
 
 def masters(root: Path, recipe: Recipe) -> Iterator[tuple[Path, str]]:

@@ -27,6 +27,14 @@ def unreadable(path: Path) -> UserError:
     return UserError(f"cannot read {path}: this user has no permission; ask its owner for it")
 
 
+def unsupported(path: Path, version: str, readable: tuple[str, ...]) -> UserError:
+    """A shard of a version of the schema that is not known here."""
+    return UserError(
+        f"{path} has schema version {version}, and this program reads {' and '.join(readable)}; use the program that "
+        "wrote it, or make the dataset again in another folder"
+    )
+
+
 def refused(path: Path, error: OSError) -> UserError:
     """What the operating system refused."""
     if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):

@@ -5,13 +5,14 @@ from __future__ import annotations
 import errno
 import os
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 from datasets.errors import UserError
-from datasets.plan import shard_count
+from datasets.plan import shard_count, shard_frames
 from datasets.store.atomic import replace_atomically
 from datasets.store.dataset import Dataset, open_dataset
-from datasets.store.linear_images import LinearImageError, masters, read_linear
+from datasets.store.linear_images import LinearImageError, are_kept, masters, read_linear, require_kept
 from datasets.store.refusals import missing, refused
 
 
@@ -22,12 +23,13 @@ def reuse_linear_images(dataset: Dataset, source: Path) -> tuple[int, int]:
         How many masters were taken, and how many the dataset lacked.
 
     Raises:
-        UserError: `source` holds no dataset, is this dataset itself, or the disk or its permissions refuse.
+        UserError: `source` holds no dataset or no linear images, is this dataset itself, or the disk or its permissions
+            refuse.
     """
     if source.resolve() == dataset.root.resolve():
         raise UserError(f"--reuse {source} is the dataset that is to be made; give the folder of another one")
-    offered = {key: path for path, key in masters(source, open_dataset(source).recipe)}
-    lacking = [(path, key) for path, key in masters(dataset.root, dataset.recipe) if not path.is_file()]
+    offered = {key: path for path, key in masters(source, source_of(source).recipe)}
+    lacking = [(path, key) for path, key in _wanted(dataset) if not path.is_file()]
     taken = [(path, offered[key]) for path, key in lacking if key in offered and _is_sound(offered[key], key)]
     for path, other in taken:
         try:
@@ -53,6 +55,25 @@ def share_pictures(dataset: Dataset, source: Dataset) -> None:
                 _link_or_copy(path, place)
             except OSError as error:
                 raise refused(place, error) from error
+
+
+def source_of(folder: Path) -> Dataset:
+    """The dataset that is to give linear images.
+
+    Raises:
+        UserError: there is none, or it does not keep them.
+    """
+    source = open_dataset(folder)
+    require_kept(folder, "--reuse")
+    return source
+
+
+def _wanted(dataset: Dataset) -> Iterator[tuple[Path, str]]:
+    """Path and key of the linear images that a dataset needs: all, or if none is kept those still to be developed."""
+    kept, size, count = are_kept(dataset.root), shard_frames(dataset.recipe), shard_count(dataset.recipe)
+    for i, (path, key) in enumerate(masters(dataset.root, dataset.recipe)):
+        if kept or not dataset.is_done(dataset.shard_path("frames", i // size, count)):
+            yield path, key
 
 
 def _is_sound(path: Path, key: str) -> bool:

@@ -2,39 +2,37 @@
 
 from __future__ import annotations
 
-import hashlib
 from pathlib import Path
-
-import pyarrow.parquet as pq
 
 from datasets.errors import UserError
 from datasets.plan import shard_count
 from datasets.schema import TABLES
-from datasets.store.dataset import DIGEST_KEY, Dataset
+from datasets.store.dataset import Dataset
 from datasets.store.digest import table_digest
-from datasets.store.linear_images import LinearImageError, masters, read_linear
+from datasets.store.linear_images import LinearImageError, are_kept, masters, read_linear
+from datasets.store.manifest import Entry, content_of, shard_entry
 from datasets.store.refusals import stage_of
+from datasets.store.shard_file import DIGEST_KEY
 
 
 def verify(dataset: Dataset) -> tuple[str, list[str]]:
     """The dataset's content hash, and what is wrong with it as sentences (none if it is sound)."""
     problems: list[str] = []
-    total = hashlib.sha256(dataset.recipe.digest().encode())
+    sound: list[Entry] = []
     for table in TABLES:
         for path in dataset.shards(table):
             problem = _shard_problem(dataset, path)
             if problem:
                 problems.append(problem)
-                continue
-            content = (pq.read_metadata(path).metadata or {})[DIGEST_KEY]
-            total.update(f"{path.relative_to(dataset.root)}:".encode() + content)
+            else:
+                sound.append(shard_entry(dataset.root, path))
     problems += _missing(dataset) + _masters(dataset)
-    return total.hexdigest(), problems
+    return content_of(dataset.recipe.digest(), sound), problems
 
 
 def _shard_problem(dataset: Dataset, path: Path) -> str | None:
     try:
-        rows = dataset.read_shard(path)
+        rows = dataset.stored_rows(path)
         digest = table_digest(rows)
     except UserError as error:
         return str(error)
@@ -56,6 +54,8 @@ def _missing(dataset: Dataset) -> list[str]:
 
 def _masters(dataset: Dataset) -> list[str]:
     problems: list[str] = []
+    if not are_kept(dataset.root):
+        return problems
     for path, key in masters(dataset.root, dataset.recipe):
         try:
             read_linear(path, key)

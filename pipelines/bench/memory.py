@@ -7,7 +7,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from datasets.plan import frame_count, shard_count
+from datasets.plan import frames_of_shard, shard_count
 from datasets.recipe.model import Recipe
 from datasets.store.dataset import Dataset
 from pipelines.bench.cases import scaled
@@ -33,7 +33,7 @@ def measure(recipe: Recipe, frames: int, advance: Callable[[int], None] = lambda
             for index in range(shard_count(small)):
                 generate.run_shard(dataset, index)
                 detect.run_shard(dataset, index, detector=Detector.EDGE_FIT)
-                made = min(small.shard_frames, frame_count(small) - index * small.shard_frames)
+                made = len(frames_of_shard(small, index))
                 done += made
                 advance(made)
                 if settled is None and done >= SETTLED:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,27 +34,37 @@ def load(recipe: str, regime: str | None) -> tuple[Recipe, str]:
 
 @contextmanager
 def begin(
-    recipe: str, out: Path, regime: str | None, reuse: Path | None, console: Console, *, shared: bool = False
+    recipe: str,
+    out: Path,
+    regime: str | None,
+    reuse: Path | None,
+    console: Console,
+    *,
+    shared: bool = False,
+    keep_masters: bool = True,
 ) -> Iterator[Dataset]:
     """The dataset of a recipe, begun or resumed in `out`, with linear light from `reuse` where it fits.
 
-    Nobody else writes it while the body runs, but others that share it, with the same recipe.
+    Nobody else writes it while the body runs, but others that share it, with the same recipe. keep_masters: as for
+    `claim`.
 
     Raises:
         UserError: a recipe, folder or plan that is not usable, or another process writes the folder.
     """
     from datasets.plan import plan
     from datasets.store.claim import claim
-    from datasets.store.dataset import open_dataset
+    from datasets.store.linear_images import are_kept
+    from datasets.store.reuse import reuse_linear_images, source_of
+    from pipelines.machine import provenance
 
     loaded, text = load(recipe, regime)
     plan(loaded)
     if reuse is not None:
-        open_dataset(reuse)  # before anything is written
-    with claim(out, loaded, text, shared=shared) as dataset:
+        source_of(reuse)  # before anything is written
+    with claim(out, loaded, text, shared=shared, provenance=provenance(), keep_masters=keep_masters) as dataset:
+        if keep_masters and not are_kept(out):
+            console.print("linear images are not kept, as this dataset was begun with --no-masters")
         if reuse is not None:
-            from datasets.store.reuse import reuse_linear_images
-
             taken, lacking = reuse_linear_images(dataset, reuse)
             console.print(f"linear images: {taken} of {lacking} taken from {reuse}; the rest is rendered")
         yield dataset
@@ -66,9 +77,11 @@ def writing(folder: Path, *, shared: bool = False) -> Iterator[Dataset]:
     Raises:
         UserError: there is none, or another process writes it.
     """
+    from datasets.store.dataset import open_dataset
     from datasets.store.lock import hold
+    from pipelines.machine import provenance
 
-    dataset = opened(folder)
+    dataset = open_dataset(folder, provenance())
     with hold(folder, shared=shared):
         yield dataset
 
@@ -80,6 +93,7 @@ def complete_manifest(dataset: Dataset) -> None:
         UserError: a shard is damaged, or the folder cannot be written.
     """
     from datasets.store.lock import HeldError, hold
+    from pipelines.machine import provenance
 
     with ExitStack() as stack:
         try:
@@ -87,7 +101,7 @@ def complete_manifest(dataset: Dataset) -> None:
         except HeldError as error:
             print(f"the manifest stays as it is, as {error}", file=sys.stderr)
             return
-        dataset.write_manifest()
+        replace(dataset, provenance=provenance()).write_manifest()
 
 
 def opened(folder: Path) -> Dataset:

@@ -36,6 +36,11 @@ Reuse = Annotated[
     Path | None, typer.Option(metavar="DIR", help="Dataset whose linear light is taken where it shows the same views.")
 ]
 
+NoMasters = Annotated[
+    bool,
+    typer.Option("--no-masters", help="Do not keep linear light, nine tenths of the bytes: nothing to reuse."),
+]
+
 DetectorName = Annotated[str, typer.Option("--detector", help="edge-fit (ours), opencv-subpix or opencv-sb.")]
 OWN = "or your own as package.module:function."
 SOLVERS_HELP = (

@@ -23,6 +23,7 @@ def run(
     out: o.Out,
     regime: o.Regime = None,
     reuse: o.Reuse = None,
+    no_masters: o.NoMasters = False,
     solver: o.MoreSolvers = None,
     workers: o.Workers = 1,
     engine: o.EngineName = "local",
@@ -36,7 +37,8 @@ def run(
 
     console, part, place = Console(quiet=quiet), part_of(shard), engine_of(engine, workers, ray_address)
     settings = [*RUN_SETTINGS, *settings_of(solver or [])]
-    with begin(recipe, out, regime, reuse, console, shared=not part.is_whole) as dataset:
+    shared, keep_masters = not part.is_whole, not no_masters
+    with begin(recipe, out, regime, reuse, console, shared=shared, keep_masters=keep_masters) as dataset:
         stages.run_generate(dataset, place, console, part)
         stages.run_detect(dataset, place, console, part=part)
         stages.run_estimate(dataset, settings, place, console, part)
@@ -67,6 +69,7 @@ def generate(
     out: o.Out,
     regime: o.Regime = None,
     reuse: o.Reuse = None,
+    no_masters: o.NoMasters = False,
     workers: o.Workers = 1,
     engine: o.EngineName = "local",
     ray_address: o.RayAddress = None,
@@ -77,7 +80,8 @@ def generate(
     from pipelines.stages import run as stages
 
     console, part, place = Console(quiet=quiet), part_of(shard), engine_of(engine, workers, ray_address)
-    with begin(recipe, out, regime, reuse, console, shared=not part.is_whole) as dataset:
+    shared, keep_masters = not part.is_whole, not no_masters
+    with begin(recipe, out, regime, reuse, console, shared=shared, keep_masters=keep_masters) as dataset:
         stages.run_generate(dataset, place, console, part)
 
 

@@ -10,12 +10,14 @@ import pyarrow as pa
 from rich.console import Console
 
 from datasets.recipe.model import load_recipe
+from datasets.rows import numbers
 from datasets.store.claim import claim
 from datasets.store.dataset import Dataset
 from datasets.store.lock import hold
 from eposit import Status
 from eposit.arrays import Array
 from pipelines.engines.engine import Engine
+from pipelines.machine import provenance
 from pipelines.paper.beyond.field_images import field_of_images
 from pipelines.paper.claims import PaperSection
 from pipelines.paper.simulation import COMPONENTS, LENSES, UNITS
@@ -81,7 +83,7 @@ def pictures(name: str, folder: Path, engine: Engine, tell: Callable[[str], None
     """The dataset of a recipe that comes along, rendered and detected; what is there is kept."""
     recipe, text = load_recipe(name)
     console = Console(quiet=True)
-    with claim(folder, recipe, text) as dataset:
+    with claim(folder, recipe, text, provenance=provenance()) as dataset:
         tell(f"{name}: rendering")
         run_generate(dataset, engine, console)
         tell(f"{name}: detection")
@@ -99,7 +101,7 @@ def _table(scores: pa.Table, cameras: pa.Table, title: str, cell: Callable[[Arra
         ]
     )
     failed = np.array([status != Status.OK for status in scores["status"].to_pylist()])
-    values = np.stack([scores[column].to_numpy() for column in COLUMNS], axis=1)
+    values = numbers(scores, *COLUMNS)
     rows: list[tuple[str, ...]] = []
     for lens in LENSES:
         for setting in SETTINGS:

@@ -9,6 +9,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from datasets.rows import numbers
 from datasets.schema import COMPONENTS
 from eposit.arrays import Array, Mask
 from pipelines.statistics import FEW, bootstrap, median, percentile95, rate
@@ -45,10 +46,10 @@ def series(scores: pa.Table) -> list[Series]:
     found: list[Series] = []
     for name in dict.fromkeys(names):
         part = scores.filter(pa.array([other == name for other in names]))
-        errors = {column: part[column].to_numpy() for column in ERRORS}
+        errors = dict(zip(ERRORS, numbers(part, *ERRORS).T, strict=True))
         failed = np.array([status != "ok" for status in part["status"].to_pylist()])
         gross = np.array(part["gross_failure"].to_pylist())
-        normalised = np.stack([part[f"{component}_normalised"].to_numpy() for component in COMPONENTS], axis=1)
+        normalised = numbers(part, *(f"{component}_normalised" for component in COMPONENTS))
         found.append(Series(name, part["frame_id"].to_numpy(), errors, normalised, failed, gross))
     return found
 

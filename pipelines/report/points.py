@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from datasets.rows import covariances_by_frame, of_detector, points_by_frame
+from datasets.rows import covariances_by_frame, numbers, of_detector, points_by_frame
 from datasets.store.dataset import Dataset
 from eposit.arrays import Array, Mask
 
@@ -39,7 +39,7 @@ def point_errors(dataset: Dataset, frames: list[dict[str, Any]]) -> list[PointEr
     truth, found = dataset.read("keypoints"), dataset.read("detections")
     ids, n = [frame["frame_id"] for frame in frames], len(target.points)
     true = np.stack([points_by_frame(truth, target)[i] for i in ids])
-    theta = truth["theta_deg"].to_numpy().reshape(-1, n)
+    theta = numbers(truth, "theta_deg").reshape(-1, n)
     inside = truth["in_image"].to_numpy(zero_copy_only=False).reshape(-1, n)
     centre = np.array([[frame["cx_px"], frame["cy_px"]] for frame in frames])
     radius = true - centre[:, None]

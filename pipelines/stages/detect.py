@@ -20,8 +20,12 @@ from pipelines.detection import Detector, detect_points
 
 def path_of(dataset: Dataset, index: int, detector: str) -> Path:
     """Place of one shard."""
-    variant = "" if detector == Detector.EDGE_FIT else detector
-    return dataset.shard_path("detections", index, shard_count(dataset.recipe), variant)
+    return dataset.shard_path("detections", index, shard_count(dataset.recipe), variant_of(detector))
+
+
+def variant_of(detector: str) -> str:
+    """A detector's name in those of its shards."""
+    return "" if detector == Detector.EDGE_FIT else detector
 
 
 def is_done(dataset: Dataset, index: int, detector: str) -> bool:

@@ -10,13 +10,13 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from datasets.errors import UserError
-from datasets.plan import Frame, plan, shard_count
+from datasets.plan import Frame, frames_of_shard, shard_count
 from datasets.recipe.model import Recipe
 from datasets.rows import pose_columns, table
 from datasets.schema import FRAMES, KEYPOINTS
 from datasets.store.dataset import Dataset
 from datasets.store.images import encode_png
-from datasets.store.linear_images import LinearImageError, linear_key, linear_path, read_linear, write_linear
+from datasets.store.linear_images import LinearImageError, are_kept, linear_key, linear_path, read_linear, write_linear
 from datasets.store.refusals import refused
 from eposit.arrays import Array
 from eposit.pose import tilt_rad
@@ -27,29 +27,30 @@ from render.targets.image_region import Region
 
 
 def is_done(dataset: Dataset, index: int) -> bool:
-    """Whether both tables of a shard and its masters are there."""
+    """Whether both tables of a shard are there, and its masters if they are kept."""
     count = shard_count(dataset.recipe)
     if not all(dataset.is_done(dataset.shard_path(name, index, count)) for name in ("frames", "keypoints")):
         return False
-    return all((dataset.root / linear_path(frame)).is_file() for frame in _frames(dataset.recipe, index))
+    return not are_kept(dataset.root) or all(
+        (dataset.root / linear_path(frame)).is_file() for frame in frames_of_shard(dataset.recipe, index)
+    )
 
 
 def run_shard(dataset: Dataset, index: int, advance: Callable[[], None] = lambda: None) -> None:
-    """Make one shard of `frames` and `keypoints` and its masters.
+    """Make one shard of `frames` and `keypoints` and its masters, which are removed again if they are not kept.
 
     advance: called after each frame.
     """
     recipe = dataset.recipe
-    count, chosen = shard_count(recipe), _frames(recipe, index)
+    count, chosen = shard_count(recipe), frames_of_shard(recipe, index)
     makers = (functools.partial(_finish, dataset, frame, *_light(dataset, frame)) for frame in chosen)
     rows = list(overlapped(makers, advance))
     truth = pa.concat_tables(_keypoints(recipe, frame) for frame in chosen)
     dataset.write_shard(dataset.shard_path("keypoints", index, count), truth)
     dataset.write_shard(dataset.shard_path("frames", index, count), pa.Table.from_pylist(rows, schema=FRAMES))
-
-
-def _frames(recipe: Recipe, index: int) -> tuple[Frame, ...]:
-    return plan(recipe)[index * recipe.shard_frames : (index + 1) * recipe.shard_frames]
+    if not are_kept(dataset.root):
+        for frame in chosen:  # of another dataset, put there by `--reuse`
+            (dataset.root / linear_path(frame)).unlink(missing_ok=True)
 
 
 def _light(dataset: Dataset, frame: Frame) -> tuple[LinearImage, bool]:
@@ -87,7 +88,7 @@ def _finish(dataset: Dataset, frame: Frame, linear: LinearImage, is_new: bool) -
     """Write the linear image if it is new, develop it, and make the frame's row."""
     recipe, spec = dataset.recipe, frame.camera
     camera, relative = spec.true_camera(), linear_path(frame)
-    if is_new:
+    if is_new and are_kept(dataset.root):
         try:
             write_linear(linear, camera, dataset.root / relative, linear_key(recipe, frame))
         except OSError as error:

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
-from datasets.plan import frame_count, shard_count
+from datasets.plan import frame_count, frames_of_shard, shard_count
 from datasets.store.dataset import Dataset
 from eposit import Status
 from pipelines.adapters.registry import find_solver
@@ -200,5 +200,4 @@ def _finish(dataset: Dataset, part: Part) -> None:
 
 
 def _frames_in(dataset: Dataset, index: Any) -> int:
-    size = dataset.recipe.shard_frames
-    return min(size, frame_count(dataset.recipe) - size * index)
+    return len(frames_of_shard(dataset.recipe, index))

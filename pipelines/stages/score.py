@@ -8,14 +8,17 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
-from datasets.rows import poses, table
+from datasets.rows import pose_covariances, poses, table
 from datasets.schema import COMPONENTS, SCORES
 from datasets.store.dataset import Dataset
-from eposit import Status
+from eposit import Pose, Status
 from eposit.arrays import Array, Mask
 from eposit.pose import euler_error_rad, rotation_error_rad, rotation_error_vector
+from pipelines.stages.failures import failure_reasons
+from render.targets import Target
 
 KEY = ("frame_id", "solver", "point_source", "assumed_camera", "point_set", "noise_draw", "status")
+TRUTH = ["frame_id", *(f"q_{axis}" for axis in "wxyz"), *(f"t_{axis}_mm" for axis in "xyz"), "tilt_deg"]
 GROSS_FAILURE_FACTOR = 2.0  # the paper's star: "at least twice larger than the ground truth"
 
 
@@ -52,15 +55,19 @@ def run_shard(dataset: Dataset, estimates: Path) -> None:
     """Make one shard of `scores`."""
     rows = dataset.read_shard(estimates)
     frames = dataset.sibling(estimates, "frames")
-    truth = dataset.read_shard(frames, ["frame_id", *(f"q_{a}" for a in "wxyz"), *(f"t_{a}_mm" for a in "xyz")])
+    truth = dataset.read_shard(frames, TRUTH)
     place = {frame: i for i, frame in enumerate(truth["frame_id"].to_pylist())}
-    true = poses(truth.take([place[frame] for frame in rows["frame_id"].to_pylist()]))
+    truth = truth.take([place[frame] for frame in rows["frame_id"].to_pylist()])
+    true = poses(truth)
     found = poses(rows)
     t_error = found.t - true.t
     euler = np.degrees(euler_error_rad(found.R, true.R))
     failed = rows["status"].to_numpy(zero_copy_only=False) != Status.OK
     columns = {name: rows[name] for name in KEY}
+    columns["failure_reason"] = failure_reasons(dataset, estimates, rows)
     scores = {
+        **_places(dataset.recipe.target, true),
+        "tilt_deg": truth["tilt_deg"],
         "rotation_error_deg": np.degrees(rotation_error_rad(found.R, true.R)),
         **{f"r{axis}_error_deg": euler[:, i] for i, axis in enumerate("xyz")},
         **{f"t{axis}_error_mm": t_error[:, i] for i, axis in enumerate("xyz")},
@@ -76,14 +83,22 @@ def run_shard(dataset: Dataset, estimates: Path) -> None:
     dataset.write_shard(_path(dataset, estimates), table(SCORES, arrays))
 
 
+def _places(target: Target, true: Pose) -> dict[str, Array]:
+    """Distance and field angle of the board's centre, of b poses."""
+    centre = true.R @ target.board_centre + true.t
+    return {
+        "distance_mm": np.linalg.norm(centre, axis=1),
+        "field_deg": np.degrees(np.arctan2(np.hypot(centre[:, 0], centre[:, 1]), centre[:, 2])),
+    }
+
+
 def _normalised(rows: pa.Table, rotation: Array, translation: Array) -> dict[str, Array]:
     """Errors over their stated standard deviations, NaN without them.
 
     rotation: (b, 3) vectors on the left, rad. translation: (b, 3) mm.
     """
-    stated = rows["covariance"].combine_chunks().flatten().to_numpy(zero_copy_only=False).reshape(-1, 6, 6)
     with np.errstate(invalid="ignore"):
-        values = np.hstack((rotation, translation)) / np.sqrt(np.einsum("bii->bi", stated))
+        values = np.hstack((rotation, translation)) / np.sqrt(np.einsum("bii->bi", pose_covariances(rows)))
     return {f"{name}_normalised": values[:, i] for i, name in enumerate(COMPONENTS)}
 
 

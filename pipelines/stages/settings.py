@@ -15,6 +15,7 @@ from pipelines.adapters.user import file_name
 from pipelines.detection import Detector
 
 POINTS = ("detected", "truth", "truth+noise")
+DETECTED_BY = "detected-"  # before the name of another detector than ours, in tables
 CAMERAS = ("exact", "nominal", "paper")
 USES = ("four", "all")
 
@@ -60,7 +61,7 @@ class Setting:
     def points_name(self) -> str:
         """Name in tables, with the noise or the detector, unless that is ours."""
         if self.points == "detected" and self.detector != Detector.EDGE_FIT:
-            return f"detected-{self.detector}"
+            return f"{DETECTED_BY}{self.detector}"
         return f"truth+{self.noise_px:g}px" if self.points == "truth+noise" else self.points
 
     @property
@@ -68,6 +69,13 @@ class Setting:
         """Name of the shards."""
         draws = f"-x{self.draws}" if self.points == "truth+noise" else ""
         return f"{file_name(self.solver)}-{self.points_name}{draws}-{self.camera}-{self.use}"
+
+
+def detector_of(points_name: str) -> str | None:
+    """The detector whose points a `Setting.points_name` means; None if they are not detected ones."""
+    if points_name == "detected":
+        return Detector.EDGE_FIT
+    return points_name.removeprefix(DETECTED_BY) if points_name.startswith(DETECTED_BY) else None
 
 
 IMAGE, ALL = "image", "all"  # points and use of a system that is given the image alone

@@ -17,6 +17,7 @@ from eposit import Pose, Status
 from eposit.arrays import Array
 from pipelines.detection import Detector
 from pipelines.engines.local import LocalEngine
+from pipelines.machine import provenance
 from pipelines.paper.claims import PaperSection, judged
 from pipelines.paper.experiment import figures
 from pipelines.paper.experiment.calibration import AT_ONCE
@@ -68,7 +69,7 @@ def dataset_in(folder: Path, tell: Callable[[str], None]) -> Dataset:
     recipe, text = load_recipe(RECIPE)
     tell(f"experiment: {len(plan(recipe))} pictures in {folder}")
     quiet = Console(quiet=True)
-    with claim(folder, recipe, text) as dataset:
+    with claim(folder, recipe, text, provenance=provenance()) as dataset:
         stages.run_generate(dataset, LocalEngine(), quiet)
         for detector in DETECTORS:
             stages.run_detect(dataset, LocalEngine(), quiet, detector)

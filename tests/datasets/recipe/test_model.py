@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tomlkit import TOMLDocument
 
 from datasets.errors import UserError
-from datasets.plan import Stream, frame_count, plan, rng_for, shard_count
+from datasets.plan import Stream, frame_count, plan, rng_for, shard_count, shard_frames
 from datasets.recipe.model import describe, load_recipe, parse_recipe, recipe_names, values
 from datasets.recipe.override import with_regime
 from datasets.recipe.quality import QUALITIES
@@ -29,7 +29,7 @@ def test_every_recipe_loads_and_plans():
         assert [frame.frame_id for frame in frames] == list(range(len(frames)))
         assert parse_recipe(text, name).digest() == recipe.digest()
         assert frame_count(recipe) == len(frames)
-        assert 0 <= shard_count(recipe) * recipe.shard_frames - len(frames) < recipe.shard_frames
+        assert 0 <= shard_count(recipe) * shard_frames(recipe) - len(frames) < shard_frames(recipe)
 
 
 def test_the_demo_is_the_papers_helix_with_five_lenses():

@@ -120,7 +120,7 @@ def test_missing_rows_and_empty_poses_are_failures(poses, root, tmp_path, cli):
     assert "has no pose for 1 of 2 frames; they count as failures" in done.out
     scores = made(root, "scores")
     assert [(row["status"], row["gross_failure"]) for row in scores] == [("missing", True), ("ok", False)]
-    assert np.isnan(scores[0]["rotation_error_deg"])
+    assert scores[0]["rotation_error_deg"] is None
     empty = dict.fromkeys((*Q, *T), "")
     assert (
         cli("score", root, "--poses", write(tmp_path / "p.csv", [poses[0] | empty, poses[1]]), "--name", "b").code == 0
@@ -139,7 +139,7 @@ def test_a_status_in_the_file_is_kept(suffix, poses, root, tmp_path, cli):
     assert cli("score", root, "--poses", path, "--name", "theirs", "-q").code == 0
     rows = made(root, "scores")
     assert [row["status"] for row in rows] == ["lost", "ok"]
-    assert np.isnan(rows[0]["rotation_error_deg"])
+    assert rows[0]["rotation_error_deg"] is None
     path = write(tmp_path / f"p{suffix}", [poses[0] | {"status": "OK"}, poses[1] | {"status": None}])
     assert cli("score", root, "--poses", path, "--name", "theirs", "-q").code == 0
     assert [row["status"] for row in made(root, "scores")] == ["ok", "ok"]

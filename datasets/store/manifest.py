@@ -1,0 +1,86 @@
+"""The manifest: every shard with its hash, the hashes of all and of the frames alone, and what made them.
+
+Hashes are of decoded content, without times, versions or machine. Those stand beside them as provenance: one entry for
+each environment that has changed a shard, with the date of its first change. The shards are the source of truth, and
+the hashes can be made again from them; the provenance of a lost manifest is lost.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from datasets.store.digest import combined_digest
+from datasets.store.provenance import Provenance
+from datasets.store.refusals import damaged, unreadable
+from datasets.store.shard_file import DIGEST_KEY, VERSION_KEY
+
+MANIFEST_FILE = "manifest.json"
+Entry = dict[str, Any]
+
+
+def shard_entry(root: Path, path: Path) -> Entry:
+    """What the manifest says of a shard.
+
+    Raises:
+        UserError: it cannot be read.
+    """
+    try:
+        footer = pq.read_metadata(path)
+    except PermissionError:
+        raise unreadable(path) from None
+    except (pa.ArrowInvalid, OSError):
+        raise damaged(path) from None
+    found = footer.metadata or {}
+    version, content = (found.get(key, b"").decode() for key in (VERSION_KEY, DIGEST_KEY))
+    place = path.relative_to(root).as_posix()
+    return {"path": place, "rows": footer.num_rows, "schema_version": version, "content": content}
+
+
+def content_of(recipe: str, entries: Sequence[Entry]) -> str:
+    """The hash of a dataset. recipe: its recipe's."""
+    return combined_digest(recipe, ((entry["path"], entry["content"]) for entry in entries))
+
+
+def frames_content_of(entries: Sequence[Entry]) -> str:
+    """The hash of the frames alone: images, poses and cameras, whatever was detected and estimated since."""
+    frames = [entry for entry in entries if entry["path"].startswith("frames/")]
+    return combined_digest("", ((entry["path"], entry["content"]) for entry in frames))
+
+
+def manifest_text(root: Path, recipe: str, entries: Sequence[Entry], provenance: Provenance | None) -> str:
+    """The manifest of a dataset's folder as JSON. recipe: the recipe's hash. provenance: None leaves it as it is."""
+    manifest = {
+        "recipe": recipe,
+        "content": content_of(recipe, entries),
+        "frames_content": frames_content_of(entries),
+        "made_with": _made_with(_existing(root), entries, provenance),
+        "shards": entries,
+    }
+    return json.dumps(manifest, indent=1) + "\n"
+
+
+def _existing(root: Path) -> Entry:
+    """Provenance and contents of the manifest that is there; empty if there is none that can be read."""
+    try:
+        found = json.loads((root / MANIFEST_FILE).read_text(encoding="utf-8"))
+        return {"made_with": list(found.get("made_with", [])), "shards": _contents(found["shards"])}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return {"made_with": [], "shards": []}
+
+
+def _made_with(existing: Entry, entries: Sequence[Entry], provenance: Provenance | None) -> list[Entry]:
+    known = existing["made_with"]
+    if provenance is None or existing["shards"] == _contents(entries):
+        return known
+    own = provenance.entry()
+    return known if any(entry | {"date": own["date"]} == own for entry in known) else [*known, own]
+
+
+def _contents(entries: Sequence[Entry]) -> list[tuple[str, str]]:
+    return [(entry["path"], entry["content"]) for entry in entries]

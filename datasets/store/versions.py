@@ -1,0 +1,58 @@
+"""Versions of the tables: shards of an earlier one are read as if they had been written today."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from datasets.recipe.model import Recipe
+from datasets.schema import SCHEMA_VERSION, TABLES
+from datasets.store.nulls import with_nulls
+from datasets.store.shard_file import RECIPE_KEY
+
+NAN_VERSION = "2"  # had NaN for every null, and `scores` without what `SCORES_ADDED` names
+READABLE = (NAN_VERSION, SCHEMA_VERSION)
+SCORES_ADDED = ("failure_reason", "distance_mm", "field_deg", "tilt_deg")
+OLD_SHARD_FRAMES = 10  # of a recipe without `shard_frames`, when the version was 2
+
+
+def upgraded(rows: pa.Table, table: str) -> pa.Table:
+    """Rows of version 2, all columns or some, in today's form: nulls for NaN, added columns at their places.
+
+    A failure's reason is then its status, and the places of the target are null.
+    """
+    schema, rows = TABLES[table], with_nulls(rows)
+    for name in SCORES_ADDED if table == "scores" else ():
+        field = schema.field(name)
+        known = name == "failure_reason" and "status" in rows.column_names
+        rows = rows.append_column(field, _reasons(rows) if known else pa.nulls(rows.num_rows, field.type))
+    return rows
+
+
+def as_begun(recipe: Recipe, root: Path) -> Recipe:
+    """A recipe as a folder's shards were made, if there are any: one without `shard_frames` meant 10 in version 2.
+
+    The footers tell: they carry the hash of the recipe with the number that was meant.
+    """
+    if recipe.shard_frames is not None:
+        return recipe
+    old = recipe.model_copy(update={"shard_frames": OLD_SHARD_FRAMES})
+    return old if old.digest() in _carried(root) else recipe
+
+
+def _carried(root: Path) -> Iterator[str]:
+    """Hashes of recipes that a folder's shards carry, one of each table."""
+    for table in TABLES:
+        for path in sorted((root / table).glob("[!.]*.parquet")):
+            try:
+                yield (pq.read_metadata(path).metadata or {}).get(RECIPE_KEY, b"").decode()
+                break
+            except (OSError, pa.ArrowInvalid):
+                continue  # whoever reads the rows says what is wrong with it
+
+
+def _reasons(rows: pa.Table) -> pa.Array:
+    return pa.array([None if status == "ok" else status for status in rows["status"].to_pylist()], pa.string())
