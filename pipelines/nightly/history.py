@@ -9,7 +9,7 @@ once have different names.
 from __future__ import annotations
 
 import secrets
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -88,7 +88,7 @@ class History:
         self.root = root
 
     def append(
-        self, night: Night, findings: dict[str, Sequence[Finding]], alpha: float, measures: dict[str, pa.Table]
+        self, night: Night, findings: Mapping[str, Sequence[Finding]], alpha: float, measures: Mapping[str, pa.Table]
     ) -> None:
         """Add a run. findings: suite to what was compared. alpha: level of their family. measures: by suite and side.
 
@@ -97,7 +97,7 @@ class History:
         """
         sweep(self.root)  # what killed processes left half written
         digests = [(name, self.keep(table)) for name, table in measures.items()]
-        _write(self.root / "findings" / f"{night.run_id}.parquet", _finding_rows(night.run_id, findings, alpha))
+        _write(self.root / "findings" / f"{night.run_id}.parquet", finding_rows(night.run_id, findings, alpha))
         _write(self.root / "runs" / f"{night.run_id}.parquet", _run_row(night, digests))
 
     def keep(self, measures: pa.Table) -> str:
@@ -201,7 +201,8 @@ def _pairs(items: Sequence[tuple[str, str]]) -> list[dict[str, str]]:
     return [{"name": name, "value": value} for name, value in items]
 
 
-def _finding_rows(run_id: str, findings: dict[str, Sequence[Finding]], alpha: float) -> pa.Table:
+def finding_rows(run_id: str, findings: Mapping[str, Sequence[Finding]], alpha: float) -> pa.Table:
+    """What was compared, by suite, as rows of `FINDINGS`. alpha: level of their family."""
     columns: dict[str, Callable[[Finding, int], object]] = {
         "slice": lambda item, _: item.slice,
         "metric": lambda item, _: item.change.metric.name,

@@ -1,0 +1,83 @@
+"""A night with everything that was compared: what all outputs are written from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from pipelines.nightly.comparison import Verdict
+from pipelines.nightly.judgement import Finding
+from pipelines.nightly.measures import slices
+from pipelines.nightly.record import Night
+
+CANDIDATE = "new"  # the side of a table of measures that is judged
+
+
+@dataclass(frozen=True, slots=True)
+class SliceCount:
+    """How many frames one side has in a slice, and how many of them failed."""
+
+    suite: str
+    side: str  # old or new
+    slice: str
+    frames: int
+    failed: int
+
+
+@dataclass(frozen=True, slots=True)
+class Results:
+    """One night as `History.append` takes it."""
+
+    night: Night
+    findings: Mapping[str, Sequence[Finding]]  # by suite
+    alpha: float  # level of each suite's family of comparisons
+    measures: Mapping[str, pa.Table]  # by suite and side, as "pinned new"
+
+    def changes(self) -> list[tuple[str, Finding]]:
+        """Suite and finding of what got worse, then of what got better, each the largest beside its margin first."""
+        found = [(suite, item) for suite, items in self.findings.items() for item in items]
+        changed = [entry for entry in found if entry[1].verdict in (Verdict.WORSE, Verdict.BETTER)]
+        return sorted(changed, key=lambda entry: (entry[1].verdict is Verdict.BETTER, -_size(entry[1])))
+
+    def smallest_visible(self, suite: str, finding: Finding) -> float:
+        """The change of a finding's metric that 95 of 100 such nights would have seen."""
+        return finding.change.smallest_visible(self.alpha, len(self.findings[suite]))
+
+    def counts(self) -> list[SliceCount]:
+        """Frames and failed frames of each slice."""
+        return [
+            SliceCount(*name.split(" ", 1), item.name, len(item.failed), int(np.sum(item.failed)))
+            for name, table in self.measures.items()
+            for item in slices(table)
+        ]
+
+    def lenses(self) -> list[str]:
+        """Every sensor regime with camera, of all suites."""
+        held = [
+            zip(table["regime"].to_pylist(), table["camera_name"].to_pylist(), strict=True) for table in self._new()
+        ]
+        from_measures = {"/".join(key) for keys in held for key in keys}
+        from_findings = {lens_of(item.slice) for items in self.findings.values() for item in items}
+        return sorted(from_measures | from_findings)
+
+    def lens_of_frame(self, suite: str, frame: int) -> str | None:
+        """Sensor regime with camera of a frame; None if no table of measures holds it."""
+        table = self.measures.get(f"{suite} {CANDIDATE}")
+        own = None if table is None else table.filter(pc.equal(table["frame_id"], frame))
+        return f"{own['regime'][0]}/{own['camera_name'][0]}" if own else None
+
+    def _new(self) -> list[pa.Table]:
+        return [table for name, table in self.measures.items() if name.endswith(f" {CANDIDATE}")]
+
+
+def lens_of(slice: str) -> str:
+    """Sensor regime with camera of a slice, without the system."""
+    return "/".join(slice.split("/", 2)[:2])
+
+
+def _size(finding: Finding) -> float:
+    return abs(finding.change.effect) / finding.change.metric.margin
