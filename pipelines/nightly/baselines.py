@@ -90,6 +90,8 @@ def load(path: Path) -> Baselines:
 def accept(path: Path, entry: Baseline | Waiver) -> Baselines:
     """Add a new baseline, or a waiver, at the end of the file; what is there stays byte for byte.
 
+    A checkout that is not absolute lies beside the file.
+
     Raises:
         UserError: the file as it is, or with the entry, is wrong; then it does not change. The disk refuses.
     """
@@ -124,7 +126,7 @@ def _inline(values: dict[str, str]) -> tomlkit.items.InlineTable:
 
 
 def _plain(value: object) -> object:
-    return str(value.resolve()) if isinstance(value, Path) else value
+    return value.as_posix() if isinstance(value, Path) else value
 
 
 def _covered(item: Waiver) -> str:

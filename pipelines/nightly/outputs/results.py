@@ -10,9 +10,11 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from pipelines.nightly.comparison import Verdict
+from pipelines.nightly.gates import fresh
 from pipelines.nightly.judgement import Finding
 from pipelines.nightly.measures import slices
-from pipelines.nightly.record import Night
+from pipelines.nightly.record import Night, State
+from pipelines.nightly.suites import FRESH, PINNED
 
 CANDIDATE = "new"  # the side of a table of measures that is judged
 
@@ -38,9 +40,18 @@ class Results:
     measures: Mapping[str, pa.Table]  # by suite and side, as "pinned new"
 
     def changes(self) -> list[tuple[str, Finding]]:
-        """Suite and finding of what got worse, then of what got better, each the largest beside its margin first."""
-        found = [(suite, item) for suite, items in self.findings.items() for item in items]
-        changed = [entry for entry in found if entry[1].verdict in (Verdict.WORSE, Verdict.BETTER)]
+        """Suite and finding of what got worse, then of what got better, each the largest beside its margin first.
+
+        Of views that nobody has seen before, only what a second look has confirmed: one look in twenty finds something
+        by chance.
+        """
+        seen = [(suite, item) for suite in (PINNED, FRESH) for item in self.findings.get(suite, ())]
+        confirmed = self._confirmed()
+        changed = [
+            (suite, item)
+            for suite, item in seen
+            if item.verdict in (Verdict.WORSE, Verdict.BETTER) and (suite == PINNED or _key(item) in confirmed)
+        ]
         return sorted(changed, key=lambda entry: (entry[1].verdict is Verdict.BETTER, -_size(entry[1])))
 
     def smallest_visible(self, suite: str, finding: Finding) -> float:
@@ -70,6 +81,12 @@ class Results:
         own = None if table is None else table.filter(pc.equal(table["frame_id"], frame))
         return f"{own['regime'][0]}/{own['camera_name'][0]}" if own else None
 
+    def _confirmed(self) -> set[tuple[str, str]]:
+        """Slice and metric of what gate `fresh` believes, be it accepted or not."""
+        believed = (State.FAILED, State.WAIVED)
+        own = [item for item in self.night.outcomes if item.gate == fresh.GATE and item.state in believed]
+        return {_key(finding) for outcome in own for finding in outcome.findings}
+
     def _new(self) -> list[pa.Table]:
         return [table for name, table in self.measures.items() if name.endswith(f" {CANDIDATE}")]
 
@@ -77,6 +94,10 @@ class Results:
 def lens_of(slice: str) -> str:
     """Sensor regime with camera of a slice, without the system."""
     return "/".join(slice.split("/", 2)[:2])
+
+
+def _key(finding: Finding) -> tuple[str, str]:
+    return finding.slice, finding.change.metric.name
 
 
 def _size(finding: Finding) -> float:

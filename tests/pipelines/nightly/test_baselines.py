@@ -22,6 +22,7 @@ recipe = "nightly"
 checkout = "old"
 commit = "0a1b2c3"
 pinned_data = "{0}"
+run = "20260228T030000Z-00000000"
 measures = {{ pinned = "{0}" }}
 accepted_by = "Ada"
 accepted_on = 2026-03-01
@@ -39,8 +40,7 @@ run = "20260301T030000Z-00000000"
 
 
 @pytest.fixture
-def path(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def path(tmp_path):
     (tmp_path / "old").mkdir()
     path = tmp_path / "baselines.toml"
     path.write_text(WRITTEN)
@@ -49,7 +49,12 @@ def path(tmp_path, monkeypatch):
 
 def _baseline(name, **changes):
     given = {"recipe": "nightly", "checkout": Path("old"), "commit": "ffff", "pinned_data": "1" * 64}
-    given |= {"measures": {"pinned": "2" * 64, "fresh": "3" * 64}, "accepted_by": "Bo", "accepted_on": TODAY}
+    given |= {
+        "measures": {"pinned": "2" * 64, "fresh": "3" * 64},
+        "accepted_by": "Bo",
+        "accepted_on": TODAY,
+        "run": "r",
+    }
     return Baseline(name=name, reason='corners "without" bias\nand a new lens', **(given | changes))
 
 

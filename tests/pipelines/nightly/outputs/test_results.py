@@ -1,10 +1,13 @@
 """What all outputs are written from: lenses, changes in their order, counts; and that all are written."""
 
+import dataclasses
+
 import pytest
 
 from datasets.errors import UserError
 from pipelines.nightly.comparison import Verdict
 from pipelines.nightly.outputs import write_all
+from pipelines.nightly.record import Exit, State
 from tests.pipelines.nightly import simulated
 from tests.pipelines.nightly.whole_nights import results
 
@@ -28,8 +31,19 @@ def test_what_is_worse_comes_first_and_the_largest_of_it():
 
     found = results(plant).changes()
     assert {suite for suite, _ in found} == {"pinned", "fresh"}
-    assert [item.verdict for _, item in found] == [Verdict.WORSE] * 4 + [Verdict.BETTER] * 2
+    assert [item.verdict for _, item in found] == [Verdict.WORSE] * 4 + [Verdict.BETTER]
     assert [item.change.metric.name for _, item in found[:4]] == ["corner_y", "corner_y", "corner_x", "corner_x"]
+
+
+def test_what_a_second_look_did_not_confirm_is_no_change():
+    night = results(simulated.corner_bias(0.002))
+    assert {suite for suite, _ in night.changes()} == {"pinned", "fresh"}
+    flagged = [
+        dataclasses.replace(item, state=State.PASSED, exit=Exit.FINE) if item.gate == "fresh" else item
+        for item in night.night.outcomes
+    ]
+    quiet = dataclasses.replace(night, night=dataclasses.replace(night.night, outcomes=tuple(flagged)))
+    assert {suite for suite, _ in quiet.changes()} == {"pinned"}
 
 
 def test_failed_frames_are_counted():
