@@ -20,7 +20,7 @@ FILLED = 0.9  # part of a drawing's height, or half width, that the largest numb
 
 
 def interval(row: Row) -> str:
-    """The effect with its interval on an axis around zero; the margin as a band, the smallest visible change as ticks."""
+    """The effect with its interval on an axis around zero; a band for the margin, ticks for the smallest visible."""
     ends = [abs(value) for value in (row.low, row.high, row.effect, row.margin, row.smallest_visible)]
     reach = max([value for value in ends if np.isfinite(value)], default=1.0) or 1.0
     middle = INTERVAL_WIDTH / 2
