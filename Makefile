@@ -27,7 +27,8 @@ demo: $(SETUP)  ## 40 rendered frames, poses and out/demo/report.html
 test: $(SETUP)  ## the tests that need pip only, under 6 minutes on 2 cores
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not full and not slow"
 
-test-full: $(SETUP)  ## adds other environments: the built wheel alone
+test-full: $(SETUP)  ## adds other environments: the built wheel alone, the nightly page in an installed Chromium
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check playwright
 	$(BIN)/python -m pytest -m full
 
 check-slow: $(SETUP)  ## thirty kills at random moments

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from eposit.arrays import Array, Mask
 from pipelines.nightly.page.findings import Row
@@ -122,7 +123,7 @@ def _between(low: Array, high: Array) -> str:
     return "".join(found)
 
 
-def _steps(nights: Array, y: Array) -> str:
+def _steps(nights: NDArray[np.intp], y: Array) -> str:
     """Corners of a step function: a night's value holds from half a night before to half a night after."""
     values, side = y[nights].tolist(), 0.5 if nights[0] <= nights[-1] else -0.5
     return " ".join(
