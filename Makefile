@@ -27,8 +27,8 @@ demo: $(SETUP)  ## 40 rendered frames, poses and out/demo/report.html
 test: $(SETUP)  ## the tests that need pip only, under 6 minutes on 2 cores
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not full and not slow"
 
-test-full: $(SETUP)  ## adds a Ray cluster, and other environments: the built wheel, readers of a dataset
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check "ray>=2.9"
+test-full: $(SETUP)  ## adds a Ray cluster, and other environments: the built wheel, readers of a dataset, a browser
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check "ray>=2.9" playwright
 	$(BIN)/python -m pytest -m full
 
 check-slow: $(SETUP)  ## kills at random moments, two commands at once

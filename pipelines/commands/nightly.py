@@ -120,7 +120,7 @@ def explain(slice: SliceName, history: HistoryFolder, run: OfRun = "latest", jso
 def report(history: HistoryFolder, run: OfRun = "latest") -> None:
     """Write report.html anew from the history."""
     from pipelines.nightly.history import History
-    from pipelines.nightly.page import write_page
+    from pipelines.nightly.page.write import write_page
 
     path = history / "report.html"
     nights = History(history)

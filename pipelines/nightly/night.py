@@ -28,7 +28,7 @@ from pipelines.nightly.judgement import Finding, Judgement, judge
 from pipelines.nightly.other_code import ROOT, Code, OtherCodeError, freeze
 from pipelines.nightly.outputs import write_all
 from pipelines.nightly.outputs.results import Results
-from pipelines.nightly.page import write_page
+from pipelines.nightly.page.write import write_page
 from pipelines.nightly.record import Exit, Night, Outcome, State
 from pipelines.stages.settings import Setting
 

@@ -1,4 +1,4 @@
-"""Frames to look at: what the baseline and the candidate found in one picture, side by side, with enlarged residuals."""
+"""Frames to look at: what both sides found in one picture, side by side, with enlarged residuals."""
 
 from __future__ import annotations
 
@@ -94,7 +94,10 @@ def _round_down(value: float) -> float:
 
 
 def _marks(picture: Picture, side: Marks, enlarged: float) -> str:
-    """Crosses at the points, askew since a board's edges meet there, arrows from them along their residuals. Pixel i of a drawing covers [i, i + 1)."""
+    """Crosses at the points, askew since a board's edges meet there, and arrows from them along their residuals.
+
+    Pixel i of a drawing covers [i, i + 1), pixel i of an image is centred at i.
+    """
     size = 0.01 * max(picture.crop.shape)
     points = side.points_px - picture.corner + 0.5
     tips = points + enlarged * side.residuals_px
@@ -125,6 +128,6 @@ def _found(side: Marks) -> str:
     if not found:
         return "nothing found"
     told = f"{found} of {len(side.points_px)} points"
-    return (
-        f"{told}, RMS {np.sqrt(np.mean(lengths**2)):.2g} px, largest {lengths.max():.2g} px" if len(lengths) else told
-    )
+    if not len(lengths):
+        return told
+    return f"{told}, RMS {np.sqrt(np.mean(lengths**2)):.2g} px, largest {lengths.max():.2g} px"

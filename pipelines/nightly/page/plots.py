@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from eposit.arrays import Array, Mask
 from pipelines.nightly.page.findings import Row
@@ -20,7 +21,7 @@ FILLED = 0.9  # part of a drawing's height, or half width, that the largest numb
 
 
 def interval(row: Row) -> str:
-    """The effect with its interval on an axis around zero; the margin as a band, the smallest visible change as ticks."""
+    """The effect with its interval on an axis around zero; a band for the margin, ticks for the smallest visible."""
     ends = [abs(value) for value in (row.low, row.high, row.effect, row.margin, row.smallest_visible)]
     reach = max([value for value in ends if np.isfinite(value)], default=1.0) or 1.0
     middle = INTERVAL_WIDTH / 2
@@ -122,7 +123,7 @@ def _between(low: Array, high: Array) -> str:
     return "".join(found)
 
 
-def _steps(nights: Array, y: Array) -> str:
+def _steps(nights: NDArray[np.intp], y: Array) -> str:
     """Corners of a step function: a night's value holds from half a night before to half a night after."""
     values, side = y[nights].tolist(), 0.5 if nights[0] <= nights[-1] else -0.5
     return " ".join(

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from eposit.arrays import Array, Mask
@@ -35,7 +34,9 @@ class Nights:
 
     def __init__(self, findings: pa.Table, run_ids: Sequence[str]) -> None:
         """findings: rows of these runs, as in `history.FINDINGS`."""
-        night = pc.index_in(findings["run_id"], pa.array(run_ids, pa.string())).to_numpy()
+        runs, names = _encoded(findings["run_id"])
+        place = {run_id: night for night, run_id in enumerate(run_ids)}
+        night = np.array([place[name] for name in names], np.int64)[runs]
         texts = [_encoded(findings[name]) for name in Key._fields]
         code = np.zeros(findings.num_rows, np.int64)
         for indices, names in texts:
@@ -53,7 +54,8 @@ class Nights:
         for name, dense in self._numbers.items():
             dense[row, night] = findings[name].to_numpy()
         self._worse = np.zeros(shape, np.bool_)
-        self._worse[row, night] = pc.equal(findings["verdict"], "worse").to_numpy()
+        verdicts, names = _encoded(findings["verdict"])
+        self._worse[row, night] = np.array([name == "worse" for name in names], np.bool_)[verdicts]
 
     def of(self, key: Key) -> Series:
         """What the nights found of one metric in one slice, which one of them must have compared."""
@@ -75,5 +77,5 @@ def headlines(rows: list[Row], changes: list[Row]) -> list[Row]:
 
 def _encoded(column: pa.ChunkedArray) -> tuple[NDArray[np.int64], list[str]]:
     """(r,) index of each text, and the texts."""
-    encoded = pc.dictionary_encode(column.combine_chunks())
+    encoded = column.combine_chunks().dictionary_encode()
     return encoded.indices.to_numpy().astype(np.int64), encoded.dictionary.to_pylist()

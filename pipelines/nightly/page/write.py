@@ -43,10 +43,8 @@ def write_page(history: History, run_id: str | None, out: Path, pictures: Sequen
     """
     ids = history.run_ids()
     if not ids or (run_id is not None and run_id not in ids):
-        named = f"no run {run_id}" if ids else "no runs"
-        raise UserError(
-            f"{history.root} has {named}; " + (f"the newest is {ids[-1]}" if ids else "run `nightly` first")
-        )
+        advice = f"no run {run_id}; the newest is {ids[-1]}" if ids else "no runs; run `nightly` first"
+        raise UserError(f"{history.root} has {advice}")
     end = len(ids) if run_id is None else ids.index(run_id) + 1
     shown = ids[max(0, end - MOST_NIGHTS) : end]
     runs = history.runs().to_pylist()[end - len(shown) : end]

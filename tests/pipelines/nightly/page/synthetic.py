@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from pipelines.nightly.history import FINDINGS, RUNS, History
-from pipelines.nightly.metrics import CORNERS, POSES, Kind
+from pipelines.nightly.metrics import CORNERS, POSES
 from pipelines.nightly.page.pictures import Marks, Picture
 from tests.pipelines.nightly.simulated import CAMERAS
 
@@ -51,12 +51,8 @@ def _static(series):
     columns |= {"metric": [item[2].name for item in series], "unit": [item[2].unit for item in series]}
     encoded = {name: pa.array(values).dictionary_encode().cast(pa.string()) for name, values in columns.items()}
     margin = np.array([item[2].margin for item in series])
-    middle = np.array(
-        [
-            -10.67 if item[2].name == "corner_log_ms" else -2.0 if item[2].kind is Kind.LOGARITHM else 0.0
-            for item in series
-        ]
-    )
+    usual = {"corner_log_ms": -10.67, "pose_log_t": -2.0, "pose_log_R": -2.0}
+    middle = np.array([usual.get(metric.name, 0.0) for *_, metric in series])
     return encoded, margin, middle
 
 
