@@ -13,8 +13,10 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from datasets.rows import pose_covariances
 from datasets.schema import COMPONENTS, FRAMES
 from datasets.store.dataset import Dataset
+from datasets.store.nulls import with_nans
 from eposit import Status
 from eposit.arrays import Array, Mask
 from pipelines.nightly.metrics import CORNERS, METRICS, POSES, Metric
@@ -149,8 +151,7 @@ def _pose_nees(dataset: Dataset, scores: pa.Table) -> Array:
 
     The stored normalised components are not enough, since the six errors depend on each other.
     """
-    estimates = dataset.read("estimates", ["covariance"])
-    covariance = estimates["covariance"].combine_chunks().flatten().to_numpy(zero_copy_only=False).reshape(-1, 6, 6)
+    covariance = pose_covariances(dataset.read("estimates", ["covariance"]))
     deviation = np.sqrt(np.einsum("bii->bi", covariance))
     correlation = covariance / deviation[:, :, None] / deviation[:, None, :]
     normalised = np.stack([_column(scores, f"{name}_normalised") for name in COMPONENTS], axis=1)
@@ -187,4 +188,4 @@ def _table(
 
 
 def _column(rows: pa.Table, name: str) -> Array:
-    return rows[name].to_numpy(zero_copy_only=False).astype(np.float64)
+    return with_nans(rows[name])
