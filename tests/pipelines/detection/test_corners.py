@@ -8,7 +8,7 @@ from pipelines.detection import detect_points
 from pipelines.detection.board_map import BoardMap
 from pipelines.detection.corners import _around_circle, refine_corners
 from pipelines.detection.finders import Found, find_board
-from render.targets.chessboard import Target
+from render.targets.chessboard import Chessboard
 from tests.pipelines.detection.test_finders import CORNERS, TARGET, drawn
 
 BESIDE_CIRCLE = [0, 9]  # the two right corners of the circle's square; the next ones are 1.6 squares from its centre
@@ -56,7 +56,7 @@ PLACES = {
 
 @pytest.mark.parametrize(("height_mm", "tilt_deg", "ways"), PLACES.values(), ids=PLACES)
 def test_what_is_left_out_around_a_raised_circle(height_mm, tilt_deg, ways):
-    target = Target(circle_height_mm=height_mm)
+    target = Chessboard(circle_height_mm=height_mm)
     board = camera_above(tilt_deg, target)
     foot, height = target.circle_centre[:2] / target.square_mm, height_mm / target.square_mm
     centres, to_unit_circle = _around_circle(board, target)
