@@ -22,6 +22,7 @@ from render.device import (
     DeviceRay,
     DeviceRayDifferential,
     DeviceSpectrum,
+    DeviceVector3,
 )
 from render.lens_law import DeviceLens, device_lens, incidence_angle
 from render.targets.image_region import Region
