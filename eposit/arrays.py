@@ -1,9 +1,9 @@
 """Names of array types, and what NumPy lacks for arrays that are long in their last axis.
 
-The layout of arrays: users give and get the problems first, (b, n, 2) and (b, 3, 3). Inside, `posit`, `refine` and
-`starts` and the methods built on them have the problems last, (n, 2, b) and (3, 3, b): one NumPy call then works on one
-number of every problem in a row of memory. Where LAPACK or matmul do the work on stacks of matrices, which NumPy takes
-in the first axes, problems are first inside, too: `opnp`, `robust` and the results in `unknown_camera`.
+The layout of arrays: users give and get the problems first, (b, n, 2) and (b, 3, 3). Inside, `posit`, `refine`,
+`starts`, `robust` and the methods built on them have the problems last, (n, 2, b) and (3, 3, b): one NumPy call then
+works on one number of every problem in a row of memory. Where LAPACK or matmul do the work on stacks of matrices, which
+NumPy takes in the first axes, problems are first inside, too: `opnp` and the results in `unknown_camera`.
 """
 
 from typing import Any

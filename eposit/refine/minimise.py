@@ -84,7 +84,7 @@ def _damped(
     counts, done = np.zeros(b, np.int64), np.zeros(b, bool)
     for step in range(1, steps + 1):
         move = solve(factorise(model.normal, damping + 1e-15), -model.gradient)
-        turn_new, t_new = _moved(turn, t, move)
+        turn_new, t_new = moved(turn, t, move)
         proposal, size = equations(view, turn_new, t_new), _size(move, t)
         better = alive & (proposal.cost <= model.cost * (1.0 + COST_FLOOR))
         before = size if before is None else before
@@ -139,7 +139,7 @@ def _with_one_matrix(
         size = _size(move, t)
         first = np.where(alive, size, np.inf) if step == 1 else first
         last = 2.0 * size / SHRINK if before is None else before  # the first need not shrink
-        turn, t = _moved(turn, t, move)
+        turn, t = moved(turn, t, move)
         ended = alive & ((size <= REST_TOL) | (size * size <= REST_TOL * last))
         counts, done, alive = counts + alive, done | ended, alive & ~ended & (size <= SHRINK * last)
         rows = np.flatnonzero(alive)
@@ -159,8 +159,8 @@ def _with_one_matrix(
     return PoseBatch(turn, t, counts, done), first
 
 
-def _moved(R: Array, t: Array, move: Array) -> tuple[Array, Array]:
-    """Poses after a step. The rotation is Cayley's, exact to third order and always a rotation."""
+def moved(R: Array, t: Array, move: Array) -> tuple[Array, Array]:
+    """Poses after the steps (6, b). The rotation is Cayley's, exact to third order and always a rotation."""
     half = 0.5 * move[:3]
     square = np.einsum("ib,ib->b", half, half)
     gain = 2.0 / (1.0 + square)

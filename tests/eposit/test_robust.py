@@ -137,8 +137,9 @@ def test_distances_from_a_pose_are_those_of_points_that_took_no_part():
     """
     camera, pose, pixels = images(EIGHT, "equisolid", 2000, 10)
     view = ray_observations(EIGHT, pixels, camera, whitening(np.asarray(SIGMA), 8), True)
-    chosen = np.broadcast_to(np.arange(8) < 6, (2000, 8))
-    mean = np.mean(distances(view, chosen, *fit(view, chosen, (pose.R, pose.t))), axis=0)
+    chosen = np.broadcast_to(np.arange(8)[:, None] < 6, (8, 2000))
+    true = np.ascontiguousarray(pose.R.transpose(1, 2, 0)), np.ascontiguousarray(pose.t.T)
+    mean = np.mean(distances(view, chosen, *fit(view, chosen, true)), axis=1)
     # The mean of 2000 such values is good to 2 / sqrt(2000) = 0.045; 0.2 is four of those and the noise's second order.
     np.testing.assert_allclose(mean, 2.0, atol=0.2)
 
