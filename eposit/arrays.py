@@ -27,3 +27,14 @@ def cross(a: Array, b: Array) -> Array:
 def take_last(values: Array, rows: NDArray[np.int64]) -> Array:
     """values[..., rows]: the same, several times faster."""
     return np.take(values, rows, axis=-1, mode="clip")
+
+
+def solve_or_nan(matrices: Array, right: Array) -> Array:
+    """np.linalg.solve of stacks, NaN for a matrix that is exactly singular."""
+    try:
+        return np.linalg.solve(matrices, right)
+    except np.linalg.LinAlgError:
+        if matrices.ndim == 2:
+            return np.full_like(right, np.nan)
+        right = np.broadcast_to(right, (*matrices.shape[:-2], *right.shape[-2:]))
+        return np.stack([solve_or_nan(matrix, side) for matrix, side in zip(matrices, right, strict=True)])

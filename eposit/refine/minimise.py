@@ -128,7 +128,8 @@ def _with_one_matrix(
 ) -> tuple[PoseBatch, Array]:
     """At most so many steps with the given inverse matrix until they vanish, for the rows that are `alive`.
 
-    Apart from `_damped` because it forms gradients only, never the matrix, which is most of a step's work.
+    Apart from `_damped` because it forms gradients only, never the matrix, which is most of a step's work: `_damped`
+    alone takes 1.5 to 1.7 times as long for 20 or 54 points, and 1.1 to 1.3 times for 4000 images of four.
     Also the sizes of the first steps, (b,).
     """
     b = len(alive)
