@@ -97,8 +97,8 @@ def fit(view: RayObservations, chosen: Mask, cam_from_obj: tuple[Array, Array]) 
     """Two Gauss-Newton steps on the chosen points, (n, b), each taken where it does not raise their squares.
 
     A loop of its own beside `refine.minimise`: each image has its own choice of points, and residuals are those of
-    rays, which exist for points that a projection on trial would put outside the lens. Its two steps take 10 ms for 2000
-    fish-eye images of eight points, where a refinement to the end takes 27 ms.
+    rays, which exist for points that a projection on trial would put outside the lens. Its two steps take 10 ms for
+    2000 fish-eye images of eight points, where a refinement to the end takes 27 ms.
     """
     R, t = cam_from_obj
     for _ in range(2):
