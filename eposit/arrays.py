@@ -6,12 +6,10 @@ works on one number of every problem in a row of memory. Where LAPACK or matmul 
 NumPy takes in the first axes, problems are first inside, too: `opnp` and the results in `unknown_camera`.
 """
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.floating[Any]]
+Array = NDArray[np.floating]
 Mask = NDArray[np.bool_]
 
 
