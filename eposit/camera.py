@@ -50,7 +50,7 @@ class Camera:
         return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
 
     def replace(self, **changes: Any) -> Self:
-        """A camera with some fields changed."""
+        """A camera with some fields changed, each of its own type: those are stated once, above."""
         return replace(self, **changes)
 
     def project(self, points_in_cam: ArrayLike) -> Array:

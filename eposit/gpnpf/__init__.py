@@ -10,14 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 from eposit.arrays import Array, Mask
 from eposit.camera import Camera
 from eposit.gpnpf.polynomials import SOLUTIONS, System, depth_ratios, squared_focal
+from eposit.least_squares import damped_gauss_newton
 from eposit.pose import Pose
 from eposit.solution import Status
 from eposit.unknown_camera import CameraCandidates, Estimate, choose, in_chunks, read, reprojection_squares, table
 
 REAL_IMAGINARY = 1e-4  # |Im s| / |s| up to which a root counts as real: rounding parts a double root by about 1e-7
 START_IMAGINARY = 1.0  # the same for a start of the least squares of five and more points: every root
-STEPS = 15  # of Gauss-Newton at most; it needs 3 to 8
-STEP_TOL = 1e-11  # relative step at which Gauss-Newton stops, near the floor of double precision
+STEPS = 15  # of Gauss-Newton at most: four points need 1 to 3; of the starts of six points half need 3 and a fifth more
 COLLINEAR = 1e-4  # second over first spread of an object below which there is no pose
 
 
@@ -71,7 +71,8 @@ def _candidates(points_in_obj: Array, offsets: Array) -> CameraCandidates:
     in_order = np.lexsort((roots.real[which, image], image))
     which, image = which[in_order], image[in_order]
     rows = system.take(image)
-    s, F = _least_squares(rows, roots.real[which, image])
+    s = roots.real[which, image]
+    s, F = damped_gauss_newton(partial(_model, rows), np.stack((s, squared_focal(rows, s))), STEPS)
     with np.errstate(invalid="ignore"):
         keep = np.isfinite(s) & (F > 0.0) & (F < 1e12)
     image, f = image[keep], np.sqrt(F[keep])
@@ -96,35 +97,15 @@ def _edge_first(points_in_obj: Array) -> NDArray[np.int64]:
     return np.array(chosen + [i for i in range(len(points_in_obj)) if i not in chosen])
 
 
-def _least_squares(system: System, s: Array) -> tuple[Array, Array]:
-    """Damped Gauss-Newton on the sum of squares, from s (m,): s and F. For four points it is Newton's method.
-
-    A loop of its own: two unknowns that are no pose, whose 2 x 2 systems have a closed form.
+def _model(system: System, unknowns: Array) -> tuple[Array, Array]:
+    """Values of the polynomials, (n - 2, m), and their slopes by s and F, (n - 2, 2, m), at s and F, (2, m).
 
     The slope along s is a complex step, which for polynomials is exact.
     """
-    focal2 = squared_focal(system, s)
-    with np.errstate(all="ignore"):
-        cost, damping, moving = _total(system.values(s, focal2) ** 2), np.full_like(s, 1e-8), np.isfinite(s + focal2)
-        for _ in range(STEPS):
-            if not np.any(moving):
-                break
-            stepped = system.values(s + 1e-30j, focal2)
-            miss, by_s, by_f = np.real(stepped), np.imag(stepped) / 1e-30, system.slope_in_focal2(s, focal2)
-            a, b, c = _total(by_s**2) * (1.0 + damping), _total(by_s * by_f), _total(by_f**2) * (1.0 + damping)
-            right_s, right_f = _total(by_s * miss), _total(by_f * miss)
-            step_s, step_f = (np.array((c, -b)) * right_s + np.array((-b, a)) * right_f) / -(a * c - b * b)
-            cost_new = _total(system.values(s + step_s, focal2 + step_f) ** 2)
-            better = moving & (cost_new < cost)
-            s, focal2 = np.where(better, s + step_s, s), np.where(better, focal2 + step_f, focal2)
-            cost, damping = np.where(better, cost_new, cost), damping * np.where(better, 0.1, 10.0)
-            moving &= np.maximum(np.abs(step_s) / np.abs(s), np.abs(step_f) / np.abs(focal2)) > STEP_TOL
-    return s, focal2
-
-
-def _total(values: Array) -> Array:
-    """Sum over the first axis in one order for any number of columns."""
-    return np.cumsum(values, axis=0)[-1] if len(values) > 2 else values[0] + values[1]
+    s, focal2 = unknowns
+    stepped = system.values(s + 1e-30j, focal2)
+    slopes = np.stack((np.imag(stepped) / 1e-30, system.slope_in_focal2(s, focal2)), axis=1)
+    return np.real(stepped), slopes
 
 
 def _poses(points_in_obj: Array, system: System, s: Array, f: Array) -> tuple[Pose, Mask]:

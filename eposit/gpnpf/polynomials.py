@@ -32,7 +32,7 @@ from eposit.arrays import Array
 SOLUTIONS = 10
 ANGLES = np.pi * (np.arange(8) + 0.5) / 8.0  # upper half of 16 nodes on a circle; conjugates give the other half
 RADII = (0.9, 0.25, 0.07)  # circles of s: a far object has s of the order of its size over its distance
-Numbers = NDArray[Any]  # real or complex
+Numbers = NDArray[Any]  # real or complex, results as arguments: Any, as a type of either is accepted by neither's users
 
 
 @dataclass(frozen=True, slots=True)

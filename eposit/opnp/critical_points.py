@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import qr
 
-from eposit.arrays import Array
+from eposit.arrays import Array, solve_or_nan
 
 PAIRS = 40
 RANK = 125  # of the multiples of the minors in degree 8
@@ -169,17 +169,6 @@ def newton_step(y: Array, A: Array, d: Array) -> Array:
     slopes = A[:, None] @ (y @ fixed.slopes.reshape(40, 4).T).reshape(*y.shape[:2], 10, 4)
     hessian = curl + np.swapaxes(slopes, 2, 3) @ slopes
     return -solve_or_nan(hessian, curl @ y[..., None])[..., 0]
-
-
-def solve_or_nan(matrices: Array, right: Array) -> Array:
-    """np.linalg.solve of stacks, NaN for a matrix that is exactly singular."""
-    try:
-        return np.linalg.solve(matrices, right)
-    except np.linalg.LinAlgError:
-        if matrices.ndim == 2:
-            return np.full_like(right, np.nan)
-        right = np.broadcast_to(right, (*matrices.shape[:-2], *right.shape[-2:]))
-        return np.stack([solve_or_nan(matrix, side) for matrix, side in zip(matrices, right, strict=True)])
 
 
 def _quick(forms: Array) -> tuple[Array, Array]:

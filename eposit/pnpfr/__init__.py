@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from eposit.arrays import Array, Mask
 from eposit.camera import Camera
+from eposit.least_squares import damped_gauss_newton
 from eposit.pnpfr.polynomials import SOLUTIONS, Complex, dual_basis, solve_roots
 from eposit.pose import Pose, rotation_from_vector
 from eposit.shape import Shape
@@ -16,9 +17,9 @@ from eposit.solution import Status
 from eposit.unknown_camera import CameraCandidates, Estimate, choose, in_chunks, read, reprojection_squares, table
 
 REAL_IMAGINARY = 1e-4  # largest imaginary part of the relative depths and of k up to which a root counts as real
-STEPS = 6  # of Newton's method; it needs 2 to 4
-AXIS = 1e-4  # least distance from the principal point, relative to the farthest, before Newton's method
-ORTHOGONAL = 1e-6  # deviation from a rotation above which Newton's method has not arrived
+STEPS = 6  # of the least squares at most; half need 2, 99 in 100 up to 5
+AXIS = 1e-4  # least distance from the principal point, relative to the farthest, before the least squares
+ORTHOGONAL = 1e-6  # deviation from a rotation above which the least squares have not arrived
 REPRODUCED_PX2 = 1e-6  # sum of squares above which a root is none: true ones leave rounding, below 1e-12
 ASKEW = rotation_from_vector((0.7, -1.1, 0.4))  # turns the object's axes away from those of its points, any will do
 
@@ -80,8 +81,11 @@ def _candidates(points_in_obj: Array, offsets: Array) -> CameraCandidates:
         which, image = np.nonzero(~roots.spurious & (imaginary < REAL_IMAGINARY))
     order = np.lexsort((roots.axis.real[which, image], image))
     which, image = which[order], image[order]
-    depths, k = _newton(dual_basis(obj), w[:, image].T, depths.real[:, which, image].T, roots.k.real[which, image])
-    pose, f, sound = _poses(dual_basis(obj), w[:, image].T, depths, k)
+    dual, seen = dual_basis(obj), w[:, image].T
+    unknowns = np.concatenate((depths.real[:, which, image], roots.k.real[None, which, image]))
+    unknowns = damped_gauss_newton(partial(_model, dual, seen), unknowns, STEPS)
+    k = unknowns[4]
+    pose, f, sound = _poses(dual, seen, unknowns[:4].T, k)
     t = pose.t * size - (pose.R @ ASKEW) @ points_in_obj[0]
     rows, R = image[sound], (pose.R @ ASKEW)[sound]
     f_px, k_per_px2 = f[sound] * scale[rows], k[sound] / scale[rows] ** 2
@@ -94,31 +98,22 @@ def _rows(dual: Array, w: Complex, depths: Array, k: Array) -> tuple[Array, Arra
     return (w.real * depths) @ dual, (w.imag * depths) @ dual, (bent * depths) @ dual
 
 
-def _newton(dual: Array, w: Complex, depths: Array, k: Array) -> tuple[Array, Array]:
-    """Newton's method on |p1| = |p2|, p1 . p2 = p1 . p3 = p2 . p3 = 0 in the depths (m, 4) and k (m,).
+def _model(dual: Array, w: Complex, unknowns: Array) -> tuple[Array, Array]:
+    """|p1| = |p2| and p1 . p2 = p1 . p3 = p2 . p3 = 0 in the depths and k, (5, m): what they miss, and their slopes.
 
-    A loop of its own: as many equations as unknowns, so there is no cost to bring down and no damping.
+    All four hold for any common factor of the depths. A fifth equation without a residual keeps steps from changing it.
     """
+    depths, k = unknowns[:4].T, unknowns[4]
     u, v, r2 = w.real, w.imag, np.abs(w) ** 2
-    for _ in range(STEPS):
-        p1, p2, p3 = _rows(dual, w, depths, k)
-        y1, y2, y3, bent = p1 @ dual.T, p2 @ dual.T, p3 @ dual.T, 1.0 + k[:, None] * r2
-        by_k = (r2 * depths) @ dual
-        miss = np.stack(
-            (_inner(p1, p1) - _inner(p2, p2), 2.0 * _inner(p1, p2), _inner(p1, p3), _inner(p2, p3), 0.0 * k)
-        )
-        slope = np.zeros((len(k), 5, 5))
-        slope[:, 0, :4], slope[:, 1, :4] = 2.0 * (y1 * u - y2 * v), 2.0 * (y1 * v + y2 * u)
-        slope[:, 2, :4], slope[:, 3, :4] = y3 * u + y1 * bent, y3 * v + y2 * bent
-        slope[:, 2, 4], slope[:, 3, 4], slope[:, 4, :4] = _inner(p1, by_k), _inner(p2, by_k), depths
-        size = np.max(np.abs(slope), axis=2)
-        usable = np.all(np.isfinite(slope), axis=(1, 2)) & np.all(size > 0.0, axis=1)
-        usable[usable] = np.abs(np.linalg.det(slope[usable] / size[usable, :, None])) > 1e-14
-        step = np.zeros((len(k), 5))
-        right = (miss.T[usable] / size[usable])[..., None]
-        step[usable] = np.linalg.solve(slope[usable] / size[usable, :, None], right)[..., 0]
-        depths, k = depths - step[:, :4], k - step[:, 4]
-    return depths, k
+    p1, p2, p3 = _rows(dual, w, depths, k)
+    y1, y2, y3, bent = p1 @ dual.T, p2 @ dual.T, p3 @ dual.T, 1.0 + k[:, None] * r2
+    by_k = (r2 * depths) @ dual
+    miss = np.stack((_inner(p1, p1) - _inner(p2, p2), 2.0 * _inner(p1, p2), _inner(p1, p3), _inner(p2, p3), 0.0 * k))
+    slope = np.zeros((5, 5, len(k)))
+    slope[0, :4], slope[1, :4] = 2.0 * (y1 * u - y2 * v).T, 2.0 * (y1 * v + y2 * u).T
+    slope[2, :4], slope[3, :4] = (y3 * u + y1 * bent).T, (y3 * v + y2 * bent).T
+    slope[2, 4], slope[3, 4], slope[4, :4] = _inner(p1, by_k), _inner(p2, by_k), depths.T
+    return miss, slope
 
 
 def _poses(dual: Array, w: Complex, depths: Array, k: Array) -> tuple[Pose, Array, Mask]:

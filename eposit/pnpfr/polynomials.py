@@ -20,7 +20,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +29,7 @@ from eposit.arrays import Array
 ROOTS, SOLUTIONS = 16, 12
 PARALLEL = 1e-5  # sine of the angle between z and z' below which a root is none of the twelve
 NODES = np.exp(2j * np.pi * (np.arange(20) + 0.25) / 20)  # on the unit circle; 17 would determine the resultant
-Complex = NDArray[np.complexfloating[Any, Any]]
+Complex = NDArray[np.complexfloating]
 
 
 @dataclass(frozen=True, slots=True)

@@ -84,7 +84,7 @@ def _damped(
     counts, done = np.zeros(b, np.int64), np.zeros(b, bool)
     for step in range(1, steps + 1):
         move = solve(factorise(model.normal, damping + 1e-15), -model.gradient)
-        turn_new, t_new = _moved(turn, t, move)
+        turn_new, t_new = moved(turn, t, move)
         proposal, size = equations(view, turn_new, t_new), _size(move, t)
         better = alive & (proposal.cost <= model.cost * (1.0 + COST_FLOOR))
         before = size if before is None else before
@@ -128,7 +128,8 @@ def _with_one_matrix(
 ) -> tuple[PoseBatch, Array]:
     """At most so many steps with the given inverse matrix until they vanish, for the rows that are `alive`.
 
-    Apart from `_damped` because it forms gradients only, never the matrix, which is most of a step's work.
+    Apart from `_damped` because it forms gradients only, never the matrix, which is most of a step's work: `_damped`
+    alone takes 1.5 to 1.7 times as long for 20 or 54 points, and 1.1 to 1.3 times for 4000 images of four.
     Also the sizes of the first steps, (b,).
     """
     b = len(alive)
@@ -139,7 +140,7 @@ def _with_one_matrix(
         size = _size(move, t)
         first = np.where(alive, size, np.inf) if step == 1 else first
         last = 2.0 * size / SHRINK if before is None else before  # the first need not shrink
-        turn, t = _moved(turn, t, move)
+        turn, t = moved(turn, t, move)
         ended = alive & ((size <= REST_TOL) | (size * size <= REST_TOL * last))
         counts, done, alive = counts + alive, done | ended, alive & ~ended & (size <= SHRINK * last)
         rows = np.flatnonzero(alive)
@@ -159,8 +160,8 @@ def _with_one_matrix(
     return PoseBatch(turn, t, counts, done), first
 
 
-def _moved(R: Array, t: Array, move: Array) -> tuple[Array, Array]:
-    """Poses after a step. The rotation is Cayley's, exact to third order and always a rotation."""
+def moved(R: Array, t: Array, move: Array) -> tuple[Array, Array]:
+    """Poses after the steps (6, b). The rotation is Cayley's, exact to third order and always a rotation."""
     half = 0.5 * move[:3]
     square = np.einsum("ib,ib->b", half, half)
     gain = 2.0 / (1.0 + square)

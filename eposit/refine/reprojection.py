@@ -105,15 +105,30 @@ def equations(view: Observations, R: Array, t: Array) -> Equations:
     residual = view.whiten(side * scale[:, None] - view.seen)
     jacobian = np.empty((n, 2, 6, b))
     _fill_slopes(view, jacobian[:, :, 3:], side, scale, forward, bend)
+    fill_turn_slopes(jacobian, arm)
+    rows = jacobian.reshape(2 * n, 6, b)
+    slope = np.einsum("kb,kib->ib", residual.reshape(2 * n, b), rows)
+    return Equations(cost(residual), slope, upper_normal(rows))
+
+
+def fill_turn_slopes(jacobian: Array, arm: Array) -> None:
+    """Slopes by a rotation vector on the left, from those by the translation.
+
+    jacobian: (n, 2, 6, b) with the slopes by the translation in [:, :, 3:]; [:, :, :3] is written. arm: (n, 3, b)
+    turned points, without the translation.
+    """
     lever = arm[:, None]
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         np.multiply(lever[:, :, j], jacobian[:, :, 3 + k], out=jacobian[:, :, i])
         jacobian[:, :, i] -= lever[:, :, k] * jacobian[:, :, 3 + j]
-    rows = jacobian.reshape(2 * n, 6, b)
-    normal = np.empty((6, 6, b))
+
+
+def upper_normal(rows: Array) -> Array:
+    """(6, 6, b) J^T J of (m, 6, b) rows of J; the upper triangle, the rest is not written."""
+    normal = np.empty((6, 6, rows.shape[-1]))
     for i in range(6):
         np.einsum("kb,kjb->jb", rows[:, i], rows[:, i:], out=normal[i, i:])
-    return Equations(cost(residual), np.einsum("kb,kib->ib", residual.reshape(2 * n, b), rows), normal)
+    return normal
 
 
 def _fill_slopes(view: Observations, out: Array, side: Array, scale: Array, forward: Array, bend: Array | None) -> None:

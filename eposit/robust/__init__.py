@@ -10,13 +10,13 @@ Source:
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eposit.arrays import Array, Mask
+from eposit.arrays import Array, Mask, take_last
 from eposit.camera import Camera
 from eposit.pose import Pose
 from eposit.robust.ray_residuals import RayObservations, distances, fit, ray_observations, squares
@@ -26,7 +26,7 @@ from eposit.starts.p3p import p3p_poses
 
 LEAST_POINTS = 8  # two may be exchanged: of the six others three give a pose, and three confirm it
 TRIANGLES = 24
-KEPT = 4  # starts that are followed
+KEPT = 4  # starts that are followed; a triangle has no more poses
 STEPS = 3  # concentration steps of each
 FALSE_ALARM = 0.01  # share of images without a wrong point that may lose one
 SCALE_FLOOR_PX = 1e-6  # scatter below this is rounding
@@ -50,18 +50,16 @@ def find_inliers(points_in_obj: Array, points_px: Array, camera: Camera, weights
             f"robust=True was given {n} points; it takes {LEAST_POINTS} or more, so that with two exchanged three of "
             "the others give a pose and three confirm it: give more points or leave robust out"
         )
-    view, inliers = (
-        ray_observations(points_in_obj, points_px, camera, weights, known),
-        np.ones(points_px.shape[:2], bool),
-    )
+    view = ray_observations(points_in_obj, points_px, camera, weights, known)
+    inliers = np.ones(points_px.shape[:2], bool)
     triangles, size = spread_triangles(points_in_obj, TRIANGLES), max(1, CHUNK_POINTS // n)
     for i in range(0, len(points_px) if triangles else 0, size):
-        rows = slice(i, i + size)
+        rows = np.arange(i, min(i + size, len(points_px)))
         part = view.take(rows)
-        enough = np.sum(np.isfinite(part.rays[..., 0]), axis=1) >= view.least
+        enough = np.sum(np.isfinite(part.rays[:, 0]), axis=0) >= view.least
         with np.errstate(all="ignore"):
             found = _search(part, *_trimmed(part, triangles))
-        inliers[rows] = np.where(enough[:, None], found, True)
+        inliers[rows] = np.where(enough, found, True).T
     return inliers
 
 
@@ -96,29 +94,34 @@ def _in_order(solution: Solution, rows: NDArray[np.int64]) -> Solution:
 
 def _trimmed(view: RayObservations, triangles: list[list[int]]) -> tuple[tuple[Array, Array], Mask]:
     """Pose and points of the least trimmed squares: the lowest sum of the `least` smallest squared residuals."""
-    poses = _starts(view, triangles)
+    b = view.rays.shape[-1]
+    several = view.take(np.tile(np.arange(b), KEPT))  # KEPT poses of each image, b columns apart
+    sums, R, t = (np.concatenate(parts, axis=-1) for parts in zip(*_of_triangles(several, triangles, b), strict=True))
+    pose = _cheapest(sums, R, t, b, KEPT)
     for _ in range(STEPS):
-        poses = fit(view, _nearest(squares(view, *poses), view.least), poses)
-    best = _cheapest(view, poses, 1)
-    pose = best[0][0], best[1][0]
-    return pose, _nearest(squares(view, *pose), view.least)
+        pose = fit(several, _nearest(squares(several, *pose), view.least), pose)
+    best = _cheapest(_trimmed_sum(several, *pose), *pose, b, 1)
+    return best, _nearest(squares(view, *best), view.least)
 
 
-def _starts(view: RayObservations, triangles: list[list[int]]) -> tuple[Array, Array]:
-    """The KEPT poses of triangles with the lowest trimmed sums."""
-    rays = view.rays.transpose(1, 2, 0)
-    poses = [pose for three in triangles for pose in p3p_poses(view.points_in_obj[three], rays[three], 4)]
-    return _cheapest(
-        view, (np.stack([R.transpose(2, 0, 1) for R, _ in poses]), np.stack([t.T for _, t in poses])), KEPT
-    )
+def _of_triangles(several: RayObservations, triangles: list[list[int]], b: int) -> Iterator[tuple[Array, Array, Array]]:
+    """For each triangle the trimmed sums (KEPT b,), R and t of its KEPT best poses in each image."""
+    for three in triangles:
+        poses = p3p_poses(several.points_in_obj[three], several.rays[three][..., :b], KEPT)
+        R, t = (np.concatenate(parts, axis=-1) for parts in zip(*poses, strict=True))
+        yield _trimmed_sum(several, R, t), R, t
 
 
-def _cheapest(view: RayObservations, poses: tuple[Array, Array], count: int) -> tuple[Array, Array]:
-    """Of (k, b, 3, 3) and (k, b, 3) the `count` of lowest trimmed sums for each image, lowest first."""
-    smallest = np.partition(squares(view, *poses), view.least - 1, axis=-1)[..., : view.least]
-    order = np.argsort(np.sum(smallest, axis=-1), axis=0, kind="stable")[:count]
-    images = np.arange(order.shape[1])
-    return poses[0][order, images], poses[1][order, images]
+def _trimmed_sum(view: RayObservations, R: Array, t: Array) -> Array:
+    """(b,) sums of the `least` smallest squared residuals."""
+    return np.add.reduce(np.partition(squares(view, R, t), view.least - 1, axis=0)[: view.least], axis=0)
+
+
+def _cheapest(sums: Array, R: Array, t: Array, b: int, count: int) -> tuple[Array, Array]:
+    """Of k poses of each image, b columns apart, the `count` of lowest sums, lowest first, b columns apart."""
+    order = np.argsort(sums.reshape(-1, b), axis=0, kind="stable")[:count]
+    columns = (order * b + np.arange(b)).ravel()
+    return take_last(R, columns), take_last(t, columns)
 
 
 def _search(view: RayObservations, pose: tuple[Array, Array], chosen: Mask) -> Mask:
@@ -127,18 +130,18 @@ def _search(view: RayObservations, pose: tuple[Array, Array], chosen: Mask) -> M
     The test: the squared residual of the nearest point outside, over its variance given the pose of those inside,
     has an F distribution with 2 and the pose's degrees of freedom, whose tail is (1 + 2 x / f)^(-f / 2).
     """
-    n = view.rays.shape[1]
-    answer, open_ = np.ones_like(chosen), np.ones(len(chosen), bool)
+    n, b = chosen.shape
+    answer, open_ = np.ones_like(chosen), np.ones(b, bool)
     for m in range(view.least, n):
         pose = fit(view, chosen, pose)
         distance = distances(view, chosen, *pose)
         freedom, tail = 2 * m - 6, FALSE_ALARM / (m + 1)
         limit = -np.log(tail) if view.known else 0.5 * freedom * (tail ** (-2.0 / freedom) - 1.0)
-        spread = np.sum(np.where(chosen, squares(view, *pose), 0.0), axis=1) / freedom
+        spread = np.sum(np.where(chosen, squares(view, *pose), 0.0), axis=0) / freedom
         scale = 1.0 if view.known else np.maximum(spread, SCALE_FLOOR_PX**2)
-        nearest = np.min(np.where(chosen, np.inf, distance), axis=1)
+        nearest = np.min(np.where(chosen, np.inf, distance), axis=0)
         refused = open_ & ~(nearest / (2.0 * scale) <= limit)
-        answer[refused] = chosen[refused]
+        answer[:, refused] = chosen[:, refused]
         open_ &= ~refused
         if not np.any(open_):
             break
@@ -147,8 +150,8 @@ def _search(view: RayObservations, pose: tuple[Array, Array], chosen: Mask) -> M
 
 
 def _nearest(values: Array, count: int) -> Mask:
-    """(..., n) mask of the `count` smallest of each row, earlier points first where equal."""
-    order = np.argsort(values, axis=-1, kind="stable")[..., :count]
+    """(n, b) mask of the `count` smallest of each column, earlier points first where equal."""
+    order = np.argsort(values, axis=0, kind="stable")[:count]
     mask = np.zeros(values.shape, bool)
-    np.put_along_axis(mask, order, True, axis=-1)
+    np.put_along_axis(mask, order, True, axis=0)
     return mask

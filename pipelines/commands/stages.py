@@ -33,14 +33,16 @@ def run(
 ) -> None:
     """Every stage: generate, detect, estimate, score, report."""
     from pipelines.stages import run as stages
+    from pipelines.stages.kernels import compiled_ahead
     from pipelines.stages.settings import RUN_SETTINGS, settings_of
 
     console, part, place = Console(quiet=quiet), part_of(shard), engine_of(engine, workers, ray_address)
     settings = [*RUN_SETTINGS, *settings_of(solver or [])]
     shared, keep_masters = not part.is_whole, not no_masters
     with begin(recipe, out, regime, reuse, console, shared=shared, keep_masters=keep_masters) as dataset:
-        stages.run_generate(dataset, place, console, part)
-        stages.run_detect(dataset, place, console, part=part)
+        with compiled_ahead(dataset, part) as kernels:  # beside the first pictures
+            stages.run_generate(dataset, place, console, part)
+            stages.run_detect(dataset, place, console, part=part, kernels=kernels)
         stages.run_estimate(dataset, settings, place, console, part)
         stages.run_score(dataset, place, console, part)
         if part.is_whole:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 
 from eposit.arrays import Array
-from pipelines.detection.kernels import ordered_part
+from pipelines.detection.kernels import compiled_part
 
 TINY = 1e-300  # added to the diagonal, so that a parameter without any information is no division by zero
 
 
-@ordered_part
+@compiled_part
 def solve_damped(normal: Array, right: Array, damping: float, lower: Array, out: Array) -> bool:
     """Solution of (N + damping diag N) x = b in `out` (n,); False where N is not positive definite.
 

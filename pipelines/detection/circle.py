@@ -27,7 +27,7 @@ from pipelines.detection.circle_model import (
     fit_disc,
 )
 from pipelines.detection.finders import Grey
-from pipelines.detection.kernels import ordered
+from pipelines.detection.kernels import compiled
 from render.targets.chessboard import Chessboard
 from render.targets.disc_shade import blocked_share
 
@@ -142,7 +142,7 @@ def _patch(
     )
 
 
-@ordered
+@compiled
 def _on_white(x: Array, y: Array, margin: Array, columns: int, rows: int, border: float, out: Mask) -> None:
     """Which board coordinates x, y (h, w) lie on white and `margin` (2,) squares away from black and the border."""
     for i in range(out.shape[0]):

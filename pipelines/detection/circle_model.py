@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from eposit.arrays import Array
 from pipelines.detection.erf import GAUSS, decay, signed_share
-from pipelines.detection.kernels import reordered
+from pipelines.detection.kernels import compiled
 
 Places = NDArray[np.intp]
 # Numbers of a fit, in order: disc x, y, in radii from where it is expected, and its size as a ratio; shadow x, y from
@@ -80,7 +80,7 @@ class _Picture:
     edge: Array  # (3, h, w) change of `shade` with its x, y and softness
 
 
-@reordered
+@compiled
 def _open_share(v: Array, p: Array, per_px: Array, finer: int) -> tuple[Array, Array]:
     """Share of each fine cell that the disc leaves open, and its change with the disc's x, y and size (3, h, w).
 
@@ -103,7 +103,7 @@ def _open_share(v: Array, p: Array, per_px: Array, finer: int) -> tuple[Array, A
     return out, slopes
 
 
-@reordered
+@compiled
 def _shadow(u: Array, p: Array) -> tuple[Array, Array]:
     """Share of the lamp that is hidden, and its change with the shadow's x, y and softness (3, h, w).
 
@@ -123,7 +123,7 @@ def _shadow(u: Array, p: Array) -> tuple[Array, Array]:
     return out, slopes
 
 
-@reordered
+@compiled
 def _blurred(fine: Array, kernel: Array, finer: int, rows: Places, columns: Places) -> Array:
     """Separable blur of a fine grid (h, w), at the pixels (n,), (n,) of the patch. Beyond its border the grid goes on
     as it ends."""

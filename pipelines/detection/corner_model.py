@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from eposit.arrays import Array, Mask
 from pipelines.detection.cholesky import solve_damped
 from pipelines.detection.erf import GAUSS, decay, signed_share
-from pipelines.detection.kernels import inlined, reordered
+from pipelines.detection.kernels import compiled, inlined
 
 # Numbers of a shape, in order: corner x, y, px from the start; directions of the two normals, rad; blur sigma, px;
 # mean grey m, contrast c; slope of the light g, 1/px.
@@ -58,24 +58,47 @@ class CornerFits(NamedTuple):
     converged: Mask  # (n,)
 
 
+class _Pixels(NamedTuple):
+    """Workspace: the pixels of one corner."""
+
+    x: Array  # (m,) px from where the corner is looked for
+    y: Array  # (m,)
+    grey: Array  # (m,)
+    residual: Array  # (m,) grey minus model
+    jacobian: Array  # (9, m) change of the model for a change of the shape
+
+
+class _System(NamedTuple):
+    """Workspace: the normal equations of one corner, and what they are solved for."""
+
+    normal: Array  # (9, 9)
+    lower: Array  # (9, 9)
+    right: Array  # (9,)
+    step: Array  # (9,)
+    trial: Array  # (9,) shape
+
+
 def fit_corners(image: NDArray[np.uint8], task: CornerTask, steps: int, stop: float) -> CornerFits:
     """Fit every corner by Levenberg and Marquardt.
 
     image: (height, width) 8 bits. stop: step, in standard deviations of what is fitted, at which it has converged.
     """
-    count = len(task.starts)
+    count, most = len(task.starts), (2 * task.window + 1) ** 2
     fits = CornerFits(
         np.full((count, SHAPE), np.nan), np.full((count, 2, 2), np.nan), np.full(count, np.nan), np.zeros(count, bool)
     )
-    _fit_all(image, *task, steps, stop, *fits)
+    pixels = _Pixels(np.empty(most), np.empty(most), np.empty(most), np.empty(most), np.empty((SHAPE, most)))
+    system = _System(
+        np.empty((SHAPE, SHAPE)), np.empty((SHAPE, SHAPE)), np.empty(SHAPE), np.empty(SHAPE), np.empty(SHAPE)
+    )
+    _fit_all(image, task, steps, stop, fits, pixels, system)
     return fits
 
 
 @inlined
-def _model(
-    p: Array, x: Array, y: Array, grey: Array, n: int, bend1: float, bend2: float, jacobian: Array, residual: Array
-) -> None:
-    """(9, n) change of the modelled grey for a change of the shape, and (n,) grey minus model."""
+def _model(p: Array, n: int, bend1: float, bend2: float, pixels: _Pixels) -> None:
+    """Residual and jacobian of the shape p on n pixels, between edges of two curvatures."""
+    x, y, grey, residual, jacobian = pixels
     c1, s1, c2, s2 = math.cos(p[2]), math.sin(p[2]), math.cos(p[3]), math.sin(p[3])
     x0, y0, sigma, mean, contrast, gx, gy = p[0], p[1], p[4], p[5], p[6], p[7], p[8]
     r, per_sigma, variance = c1 * c2 + s1 * s2, 1.0 / sigma, sigma * sigma
@@ -106,25 +129,19 @@ def _model(
 
 
 @inlined
-def _gather(
-    image: NDArray[np.uint8],
-    start: Array,
-    inverse: Array,
-    reach: Array,
-    window: int,
-    discs: Array,
-    disc_axes: Array,
-    x: Array,
-    y: Array,
-    grey: Array,
-) -> int:
-    """Pixels of one corner: within `window` px, `reach` squares along both axes, and off the discs."""
-    n, left, top = 0, round(start[0]), round(start[1])
-    for row in range(max(top - window, 0), min(top + window + 1, image.shape[0])):
-        for column in range(max(left - window, 0), min(left + window + 1, image.shape[1])):
-            u, v = column - start[0], row - start[1]
-            across, down = inverse[0, 0] * u + inverse[0, 1] * v, inverse[1, 0] * u + inverse[1, 1] * v
-            if abs(across) > reach[0] or abs(down) > reach[1] or u * u + v * v > window * window:
+def _gather(image: NDArray[np.uint8], task: CornerTask, i: int, pixels: _Pixels) -> int:
+    """Number of the pixels of corner i: within the window, its reach along both axes, and off the discs."""
+    inverses, reaches, window, discs, disc_axes = task.inverses, task.reaches, task.window, task.discs, task.disc_axes
+    x, y, grey = pixels.x, pixels.y, pixels.grey
+    x0, y0 = task.starts[i, 0], task.starts[i, 1]
+    n, left, top = 0, math.floor(x0 + 0.5), math.floor(y0 + 0.5)
+    first_row, first_column = (top - window if top > window else 0), (left - window if left > window else 0)
+    for row in range(first_row, top + window + 1):
+        for column in range(first_column, left + window + 1):
+            u, v = column - x0, row - y0
+            across, down = inverses[i, 0, 0] * u + inverses[i, 0, 1] * v, inverses[i, 1, 0] * u + inverses[i, 1, 1] * v
+            far = abs(across) > reaches[i, 0] or abs(down) > reaches[i, 1] or u * u + v * v > window * window
+            if far or row >= image.shape[0] or column >= image.shape[1]:
                 continue
             covered = False
             for k in range(len(discs)):
@@ -190,31 +207,23 @@ def _noise(jacobian: Array, residual: Array, n: int) -> float:
     return square / (total + 1e-300) * n / (n - SHAPE)
 
 
-@reordered
+@compiled
 def _fit_all(
     image: NDArray[np.uint8],
-    starts: Array,
-    shapes: Array,
-    bends: Array,
-    inverses: Array,
-    reaches: Array,
-    window: int,
-    discs: Array,
-    disc_axes: Array,
+    task: CornerTask,
     steps: int,
     stop: float,
-    fitted: Array,
-    covariances: Array,
-    noises: Array,
-    converged: Mask,
+    fits: CornerFits,
+    pixels: _Pixels,
+    system: _System,
 ) -> None:
-    """The fields of a `CornerTask` into those of `CornerFits`."""
-    most = (2 * window + 1) ** 2
-    x, y, grey, residual = np.empty(most), np.empty(most), np.empty(most), np.empty(most)
-    jacobian, normal, lower = np.empty((SHAPE, most)), np.empty((SHAPE, SHAPE)), np.empty((SHAPE, SHAPE))
-    right, step, trial = np.empty(SHAPE), np.empty(SHAPE), np.empty(SHAPE)
+    """Fill `fits`, whose fields hold NaN and False."""
+    starts, shapes, bends = task.starts, task.shapes, task.bends
+    fitted, covariances, noises, converged = fits
+    _, _, grey, residual, jacobian = pixels
+    normal, lower, right, step, trial = system
     for i in range(len(starts)):
-        n = _gather(image, starts[i], inverses[i], reaches[i], window, discs, disc_axes, x, y, grey)
+        n = _gather(image, task, i, pixels)
         if n < LEAST_PIXELS:
             continue
         p = fitted[i]
@@ -226,7 +235,7 @@ def _fit_all(
         _copy(trial, p)
         cost, damping, noise = -1.0, 1e-4, 0.0
         for count in range(-1 if unlevelled else 0, steps):
-            _model(trial, x, y, grey, n, bends[i, 0], bends[i, 1], jacobian, residual)
+            _model(trial, n, bends[i, 0], bends[i, 1], pixels)
             if count < 0:
                 _start_levels(jacobian[CONTRAST], grey, n, trial)
                 _copy(trial, p)
@@ -261,3 +270,18 @@ def _fit_all(
         noises[i] = noise
         p[0] += starts[i, 0]
         p[1] += starts[i, 1]
+
+
+def prepare() -> None:
+    """Call the compiled function once."""
+    nothing = CornerTask(
+        starts=np.empty((0, 2)),
+        shapes=np.empty((0, SHAPE)),
+        bends=np.empty((0, 2)),
+        inverses=np.empty((0, 2, 2)),
+        reaches=np.empty((0, 2)),
+        window=1,
+        discs=np.empty((0, 2)),
+        disc_axes=np.eye(2),
+    )
+    fit_corners(np.zeros((4, 4), np.uint8), nothing, 1, 0.5)

@@ -18,7 +18,7 @@ import numpy as np
 
 from eposit.arrays import Array
 from pipelines.detection.cholesky import solve_damped
-from pipelines.detection.kernels import ordered, ordered_part
+from pipelines.detection.kernels import compiled, compiled_part
 
 PARAMETERS = 13  # rotation 3, translation 3, lens 7
 NEWTON_STEPS = 12
@@ -26,7 +26,7 @@ TRIES = 8
 LEAST_GAIN = 1e-4  # of the cost in one step: a hundredth of a corner; a pinhole would wander for a hundred steps
 
 
-@ordered
+@compiled
 def project(R: Array, t: Array, lens: Array, x: Array, y: Array, z: float, out: Array) -> None:
     """Points (n,), (n,) on the plane z of the board to (n, 2) px in `out`."""
     f, aspect, cx, cy, k1, k2, k3 = lens
@@ -42,7 +42,7 @@ def project(R: Array, t: Array, lens: Array, x: Array, y: Array, z: float, out: 
         out[i, 1] = cy + scale * v * (1.0 + aspect)
 
 
-@ordered_part
+@compiled_part
 def _changed(R: Array, t: Array, lens: Array, change: Array, R_out: Array, t_out: Array, lens_out: Array) -> None:
     """R with the rotation vector `change[:3]` applied on the left; t and lens with the rest added.
 
@@ -64,7 +64,7 @@ def _changed(R: Array, t: Array, lens: Array, change: Array, R_out: Array, t_out
         lens_out[k] = lens[k] + change[6 + k]
 
 
-@ordered_part
+@compiled_part
 def _copy_pose(R: Array, t: Array, lens: Array, R_out: Array, t_out: Array, lens_out: Array) -> None:
     for k in range(3):
         t_out[k] = t[k]
@@ -74,7 +74,7 @@ def _copy_pose(R: Array, t: Array, lens: Array, R_out: Array, t_out: Array, lens
         lens_out[k] = lens[k]
 
 
-@ordered
+@compiled
 def slopes(R: Array, t: Array, lens: Array, x: Array, y: Array, out: Array) -> None:
     """(2 n, 13) change of the pixels of points on the board for a change of each parameter.
 
@@ -110,7 +110,7 @@ def slopes(R: Array, t: Array, lens: Array, x: Array, y: Array, out: Array) -> N
                 out[row, column] *= stretch
 
 
-@ordered_part
+@compiled_part
 def _cost(pixels: Array, found: Array, weights: Array, lens: Array, expected: Array, hold: Array) -> float:
     total = 0.0
     for i in range(len(pixels)):
@@ -120,7 +120,7 @@ def _cost(pixels: Array, found: Array, weights: Array, lens: Array, expected: Ar
     return total
 
 
-@ordered_part
+@compiled_part
 def _normal_equations(
     jacobian: Array, pixels: Array, found: Array, weights: Array, normal: Array, right: Array
 ) -> None:
@@ -139,7 +139,7 @@ def _normal_equations(
                     normal[a, b] += weighted * jacobian[row, b]
 
 
-@ordered
+@compiled
 def fit(
     R: Array, t: Array, lens: Array, x: Array, y: Array, pixels: Array, weights: Array, hold: Array, steps: int
 ) -> tuple[Array, Array, Array]:
@@ -182,7 +182,7 @@ def fit(
     return R, t, lens
 
 
-@ordered
+@compiled
 def meet_planes(R: Array, t: Array, lens: Array, x: Array, y: Array, heights: Array, out: Array) -> None:
     """Where the rays of pixels at columns x (w,) and rows y (h,) meet planes parallel to the board.
 
@@ -215,3 +215,13 @@ def meet_planes(R: Array, t: Array, lens: Array, x: Array, y: Array, heights: Ar
                 reach = (heights[k] - oz) / dz
                 out[k, 0, row, column] = ox + reach * dx
                 out[k, 1, row, column] = oy + reach * dy
+
+
+def prepare() -> None:
+    """Call each compiled function once."""
+    R, t, at = np.eye(3), np.array([0.0, 0.0, 5.0]), np.arange(2.0)
+    lens = np.array([100.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    project(R, t, lens, at, at, 0.0, np.empty((2, 2)))
+    slopes(R, t, lens, at, at, np.empty((4, PARAMETERS)))
+    meet_planes(R, t, lens, at, at, at, np.empty((2, 2, 2, 2)))
+    fit(R, t, lens, at, at, np.zeros((2, 2)), np.ones(2), np.ones(7), 1)

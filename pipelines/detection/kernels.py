@@ -1,9 +1,8 @@
-"""How the detection's small loops are compiled: four decorators, and the rule that keeps a first run's bits.
+"""How the detection's small loops are compiled: three decorators, and why none lets the compiler reorder arithmetic.
 
-A function that lets the compiler change the order of arithmetic (`reordered`) is called from Python only. Numba keeps
-a copy of a callee in each caller's library, compiled there anew, and which copy runs depends on what the process has
-loaded before: a first run, which compiles, would differ in its last digits from every later one. What such a function
-calls is `inlined`, or keeps the order of its arithmetic (`ordered`, `ordered_part`), so that all copies are equal.
+With that freedom (`fastmath`), the last digits depend on how Numba numbers its variables and blocks, and so on which
+functions a process has compiled before: a run with an empty cache, a resumed one and a worker would differ. As written,
+sums and products give the same bits from every copy of a function, whatever was compiled before it.
 
 Loops are written out in these functions: NumPy's expressions, slices and linear algebra take seconds to compile.
 """
@@ -21,23 +20,15 @@ from numba.core import config
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-# Order of sums and products may change for speed; infinities and NaN keep their meaning.
-REORDER = {"contract", "reassoc", "arcp", "nsz"}
 
-
-def ordered(function: Function) -> Function:
-    """Compiled as written, for Python and for other compiled functions."""
+def compiled(function: Function) -> Function:
+    """For Python and for other compiled functions."""
     return _kept(function)
 
 
-def ordered_part(function: Function) -> Function:
-    """Compiled as written, for other compiled functions only."""
+def compiled_part(function: Function) -> Function:
+    """For other compiled functions only."""
     return _kept(function, no_cpython_wrapper=True)
-
-
-def reordered(function: Function) -> Function:
-    """Compiled for speed, for Python only."""
-    return _kept(function, fastmath=REORDER)
 
 
 def inlined(function: Function) -> Function:

@@ -1,33 +1,84 @@
-"""Every compiled function, compiled or loaded before the first picture: a first run then says what it waits for."""
+"""Detection's compiled functions, compiled or loaded before the first picture, beside other work."""
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Callable
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from threading import Event
+from types import TracebackType
+from typing import Any
+
+from numba.core import event
 
 from pipelines.detection import circle, circle_model, corner_model, generic_lens
 
+MODULES = (corner_model, generic_lens, circle_model, circle)  # those with compiled functions; the slowest first
 
-def compile_kernels() -> None:
+
+def compile_kernels(
+    on_compile: Callable[[], None] = lambda: None, is_stopped: Callable[[], bool] = lambda: False
+) -> None:
     """Call each compiled function once, on next to nothing.
 
-    It takes some ten seconds on a machine that has not kept them yet, and a tenth of one where it has.
+    It takes seconds on a machine that has not kept them yet, and a tenth of one where it has.
+
+    on_compile: called for each function that was not kept. is_stopped: asked before each module; true ends the work.
     """
-    lens = np.array([100.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    R, t, at = np.eye(3), np.array([0.0, 0.0, 5.0]), np.arange(2.0)
-    generic_lens.project(R, t, lens, at, at, 0.0, np.empty((2, 2)))
-    generic_lens.slopes(R, t, lens, at, at, np.empty((4, generic_lens.PARAMETERS)))
-    generic_lens.meet_planes(R, t, lens, at, at, at, np.empty((2, 2, 2, 2)))
-    generic_lens.fit(R, t, lens, at, at, np.zeros((2, 2)), np.ones(2), np.ones(7), 1)
-    nothing = corner_model.CornerTask(
-        starts=np.empty((0, 2)),
-        shapes=np.empty((0, corner_model.SHAPE)),
-        bends=np.empty((0, 2)),
-        inverses=np.empty((0, 2, 2)),
-        reaches=np.empty((0, 2)),
-        window=1,
-        discs=np.empty((0, 2)),
-        disc_axes=np.eye(2),
-    )
-    corner_model.fit_corners(np.zeros((4, 4), np.uint8), nothing, 1, 0.5)
-    circle_model.prepare()
-    circle.prepare()
+    listener: Any = _OnStart(on_compile)
+    with event.install_listener("numba:compile", listener):
+        for module in MODULES:
+            if is_stopped():
+                return
+            module.prepare()
+
+
+class Kernels:
+    """The compiled functions, made ready in a thread from when the context is entered.
+
+    On leaving it, what has not begun is left out.
+    """
+
+    def __init__(self) -> None:
+        self._stop = Event()
+        self._first: Future[None] = Future()  # done when the first function turns out not to have been kept
+
+    def __enter__(self) -> Kernels:
+        self._pool = ThreadPoolExecutor(1)
+        self._all = self._pool.submit(compile_kernels, self._note, self._stop.is_set)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stop.set()
+        self._pool.shutdown()
+
+    def must_compile(self) -> bool:
+        """Whether functions are being compiled; it waits until that is known, and is false once all are ready."""
+        wait((self._first, self._all), return_when=FIRST_COMPLETED)
+        return not self._all.done()
+
+    def finish(self) -> None:
+        """Wait until all are ready.
+
+        Raises:
+            Exception: what the compiler raised.
+        """
+        self._all.result()
+
+    def _note(self) -> None:
+        if not self._first.done():
+            self._first.set_result(None)
+
+
+class _OnStart(event.Listener):
+    """Calls a function at the start of each event."""
+
+    def __init__(self, call: Callable[[], None]) -> None:
+        self._call = call
+
+    def on_start(self, event: Any) -> None:
+        self._call()
+
+    def on_end(self, event: Any) -> None:
+        pass

@@ -17,11 +17,13 @@ from datasets.store.dataset import Dataset
 from eposit import Status
 from pipelines.adapters.registry import find_solver
 from pipelines.detection import Detector
+from pipelines.detection.prepare import Kernels
 from pipelines.engines.engine import Engine
 from pipelines.stages import detect, estimate, generate, score
 from pipelines.stages import estimate_images as systems
 from pipelines.stages.estimate_images import find_estimator
 from pipelines.stages.import_poses import import_poses
+from pipelines.stages.kernels import compiled_ahead, wait_for
 from pipelines.stages.part import WHOLE, Part
 from pipelines.stages.settings import Setting, System, check_detector
 
@@ -42,14 +44,22 @@ def run_generate(dataset: Dataset, engine: Engine, console: Console, part: Part 
 
 
 def run_detect(
-    dataset: Dataset, engine: Engine, console: Console, detector: str = Detector.EDGE_FIT, part: Part = WHOLE
+    dataset: Dataset,
+    engine: Engine,
+    console: Console,
+    detector: str = Detector.EDGE_FIT,
+    part: Part = WHOLE,
+    kernels: Kernels | None = None,
 ) -> None:
-    """Detect what is missing.
+    """Detect what is missing, once the compiled functions are ready: then no two workers compile the same.
 
+    kernels: the compiled functions, if they have been begun before.
     Raises:
         UserError: an unknown detector.
     """
     check_detector(detector)
+    with compiled_ahead(dataset, part, detector, kernels) as needed:
+        wait_for(needed, console)
     _run(
         "detect" if detector == Detector.EDGE_FIT else f"detect {detector}",
         dataset,

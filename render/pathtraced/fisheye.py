@@ -12,6 +12,7 @@ from typing import Any  # Any: Mitsuba describes a sensor by dictionaries of mix
 import numpy as np
 
 from eposit import Camera, Pose
+from eposit.arrays import Array
 from render import backend
 from render.device import (
     DeviceBool,
@@ -21,8 +22,9 @@ from render.device import (
     DeviceRay,
     DeviceRayDifferential,
     DeviceSpectrum,
+    DeviceVector3,
 )
-from render.lens_law import device_lens, incidence_angle
+from render.lens_law import DeviceLens, device_lens, incidence_angle
 from render.targets.image_region import Region
 
 SENSOR = "eposit_fisheye"
@@ -63,6 +65,24 @@ def sensor_dict(camera: Camera, cam_from_obj: Pose, region: Region, samples: int
     }
 
 
+def _image_from_film(size: Any, offset: Any, focal: tuple[float, float], centre: tuple[float, float]) -> list[Array]:
+    """(2,) scale and (2,) shift from positions in [0, 1] of a film's crop to normalised image coordinates.
+
+    size, offset: of the crop, px; Any: Mitsuba's integer vectors, which NumPy reads. focal, centre: px. In double
+    precision: at 1600 px a float32 coordinate is only good to 1e-4 px.
+    """
+    return [np.array(size) / focal, (np.array(offset) - HALF_PIXEL - centre) / focal]
+
+
+def _direction(law: DeviceLens, image: DevicePoint2) -> tuple[DeviceVector3, DeviceBool]:
+    """Directions of rays in camera axes through normalised image coordinates, and whether the lens sees them."""
+    mi, dr = backend.load(), backend.jit()
+    rho = dr.norm(image)
+    theta = incidence_angle(law, dr.minimum(rho, law.rho_max))
+    side = dr.select(rho > 0.0, theta.sine / rho, 1.0)
+    return mi.Vector3f(image.x * side, image.y * side, theta.cosine), rho <= law.rho_max
+
+
 @functools.cache
 def register_sensor() -> None:
     """Define and register the plugin, once in this process.
@@ -78,14 +98,10 @@ def register_sensor() -> None:
         def __init__(self, props: Any) -> None:  # Any: values of the dictionary above
             super().__init__(props)
             coefficients = tuple(props[f"k{i}"] for i in range(1, 5) if f"k{i}" in props)
-            fx, fy, cx, cy = (props[name] for name in ("fx", "fy", "cx", "cy"))
             to_world = np.array(props["to_world"].matrix, dtype=np.float64)
-            size, offset = self.film().crop_size(), self.film().crop_offset()
             self.law = device_lens(props["lens"], coefficients)
-            # From the film position in [0, 1] of the crop to normalised image coordinates. The constants are worked
-            # out in double precision: at 1600 px a float32 coordinate is only good to 1e-4 px.
-            scale = np.array([size.x / fx, size.y / fy])
-            shift = np.array([(offset.x - HALF_PIXEL - cx) / fx, (offset.y - HALF_PIXEL - cy) / fy])
+            focal, centre = ((props[x], props[y]) for x, y in (("fx", "fy"), ("cx", "cy")))
+            scale, shift = _image_from_film(self.film().crop_size(), self.film().crop_offset(), focal, centre)
             self.scale, self.shift = mi.Vector2f(scale), mi.Vector2f(shift)
             self.rotation, self.origin = mi.Matrix3f(to_world[:3, :3]), mi.Point3f(to_world[:3, 3])
             # Opaque, so that one kernel serves all poses, regions and cameras of a lens.
@@ -100,12 +116,7 @@ def register_sensor() -> None:
             sample3: DevicePoint2,
             active: DeviceBool | bool = True,
         ) -> tuple[DeviceRay, DeviceSpectrum]:
-            image = sample2 * self.scale + self.shift
-            radius = dr.norm(image)
-            seen = radius <= self.law.rho_max
-            theta = incidence_angle(self.law, dr.minimum(radius, self.law.rho_max))
-            side = dr.select(radius > 0.0, theta.sine / radius, 1.0)
-            direction = mi.Vector3f(image.x * side, image.y * side, theta.cosine)
+            direction, seen = _direction(self.law, sample2 * self.scale + self.shift)
             ray = dr.zeros(mi.Ray3f, dr.width(direction))
             ray.o, ray.d, ray.time = mi.Point3f(self.origin), dr.normalize(self.rotation @ direction), time
             ray.maxt = dr.select(seen, dr.largest(mi.Float), 0.0)

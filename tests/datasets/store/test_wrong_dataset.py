@@ -108,13 +108,6 @@ PLACES = {
         lambda place: ("run", place.recipe(), "--out", place.new(), "--regime", "best"),
         "sensor regime is 'best'; choose one of clean, typical, paper, harsh",
     ),
-    "regime where no line fits": (
-        lambda place: (
-            *("run", place.recipe("sensor = {gamma = 2.2}\n" + place.text), "--out", place.new()),
-            *("--regime", "harsh"),
-        ),
-        'write regime = "harsh" under [sensor] there',
-    ),
 }
 
 

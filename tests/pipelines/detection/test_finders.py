@@ -27,7 +27,7 @@ def pixels_of(at, square_px, angle_deg, tilt, middle):
     return square_px * np.stack((x / depth, y / depth), axis=1) + middle
 
 
-def drawn(square_px, angle_deg, tilt=0.02, middle=(210.0, 200.0), width=WIDTH, height=HEIGHT):
+def drawn(square_px, angle_deg, tilt=0.02, middle=(210.0, 200.0), width=WIDTH, height=HEIGHT, cells=CELLS):
     """Picture of the board, and where its corners are."""
     truth = pixels_of(CORNERS, square_px, angle_deg, tilt, middle)
     plane = np.array([[-2.0, -2.0], [10.0, -2.0], [10.0, 7.0], [-2.0, 7.0]])  # the board with its margin
@@ -42,7 +42,7 @@ def drawn(square_px, angle_deg, tilt=0.02, middle=(210.0, 200.0), width=WIDTH, h
         board = (u > -2) & (u < 10) & (v > -2) & (v < 7)
         return np.where(black, BLACK, np.where(board, WHITE, BEHIND))
 
-    return digitised(picture(grey, width, height, 0.7, CELLS), np.random.default_rng(0), 1.0), truth
+    return digitised(picture(grey, width, height, 0.7, cells), np.random.default_rng(0), 1.0), truth
 
 
 def worst(found, truth):
