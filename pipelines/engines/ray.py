@@ -97,23 +97,24 @@ def _connected(engine: RayEngine) -> Any:
     Raises:
         UserError: no cluster answers.
     """
-    import ray  # pyright: ignore[reportMissingImports]
+    import ray
 
-    if ray.is_initialized():
-        return ray
+    library: Any = ray  # a type checker takes the name for this file
+    if library.is_initialized():
+        return library
     quiet: dict[str, Any] = {"log_to_driver": False, "logging_level": "ERROR"}
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # nothing is sent to Ray's makers unless the user says so
     try:
         if engine.address is None:
             local = {"num_cpus": engine.workers, "object_store_memory": STORE_BYTES, "include_dashboard": False}
-            ray.init(address="local", **local, **quiet)
+            library.init(address="local", **local, **quiet)
         else:
-            ray.init(address=engine.address, **quiet)
+            library.init(address=engine.address, **quiet)
     except (ConnectionError, RuntimeError, ValueError) as error:
         where = "Ray does not start on this machine" if engine.address is None else f"no Ray at {engine.address}"
         reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
         raise UserError(f"{where} ({reason}); start it with `ray start --head`, or correct --ray-address") from error
-    return ray
+    return library
 
 
 def _result(ray: Any, reference: Any) -> Any:

@@ -55,7 +55,7 @@ def stand_ins(tmp_path, monkeypatch):
 
 def run(script, *words):
     path = ROOT / "examples" / "cluster" / script
-    return subprocess.run([path, *map(str, words)], cwd=ROOT, capture_output=True, text=True, timeout=120, check=False)
+    return subprocess.run([path, *map(str, words)], cwd=ROOT, capture_output=True, text=True, timeout=600, check=False)
 
 
 def test_there_are_two():

@@ -24,6 +24,7 @@ pytestmark = pytest.mark.slow
 
 TRIES = 20
 PATIENCE_S = 300.0
+SHORT = 0.3  # of a whole run: what `estimate` takes, and a run that has rendered and detected, so that they overlap
 POSIT = ("--solver", "posit", "--points", "truth", "-q")
 
 
@@ -55,10 +56,10 @@ def ended(process):
     return process.returncode, err
 
 
-def at_once(commands, name, number, duration, record):
-    """Both commands, the second after a random time within a run; exit codes in the order of `commands`."""
+def at_once(commands, name, number, longest, record):
+    """Both commands, the second after a random time (s) up to `longest`; exit codes in the order of `commands`."""
     rng = random.Random(f"{name} {number}")
-    order, delay = rng.sample(range(2), 2), rng.uniform(0.0, duration)
+    order, delay = rng.sample(range(2), 2), rng.uniform(0.0, longest)
     processes = {order[0]: started(*commands[order[0]])}
     time.sleep(delay)
     overlapped = processes[order[0]].poll() is None
@@ -118,7 +119,7 @@ def test_a_run_beside_estimate(number, smoke, tmp_path, content, record_property
         shutil.rmtree(root / table)
     before = files(root)
     estimate, run = ("estimate", root, *POSIT), ("run", recipe, "--out", root, "-q")
-    codes, errs = at_once([run, estimate], "estimate", number, duration, record_property)
+    codes, errs = at_once([run, estimate], "estimate", number, SHORT * duration, record_property)
     assert all(not err or f"{root} is being written by" in err for err in errs)
     assert_sound(root, before)
     made = [path.name for path in (root / "estimates").iterdir()]
