@@ -36,7 +36,7 @@ from datasets.store.dataset import open_dataset
 from pipelines.stages import detect, estimate
 from pipelines.stages.settings import Setting
 dataset = open_dataset(Path(sys.argv[3]))
-work = {"detect": lambda: detect.run_shard(dataset, 0), "estimate": lambda: estimate.run_shard(dataset, 0, Setting())}
+work = {"detect": lambda: detect.run_shard(dataset, 0, detector="edge-fit"), "estimate": lambda: estimate.run_shard(dataset, 0, Setting())}
 for line in sys.stdin:
     spent = {}
     for name, stage in work.items():
