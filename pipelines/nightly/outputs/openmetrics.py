@@ -7,7 +7,7 @@ as well. There are no times of samples in it: the collector's own time is taken,
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from pipelines.nightly.history import finding_rows
 from pipelines.nightly.outputs.results import Results
@@ -66,7 +66,7 @@ def _counts(results: Results) -> Iterator[str]:
     yield from _gauge("failed_frames", "those that failed", zip(labels, (item.failed for item in counts), strict=True))
 
 
-def _gauge(name: str, meaning: str, samples: Iterator[tuple[Labels, float]] | list[tuple[Labels, float]]) -> list[str]:
+def _gauge(name: str, meaning: str, samples: Iterable[tuple[Labels, float]]) -> list[str]:
     lines = [f"{PREFIX}{name}{_labels(labels)} {_number(value)}" for labels, value in samples]
     return [f"# TYPE {PREFIX}{name} gauge", f"# HELP {PREFIX}{name} {meaning}", *lines] if lines else []
 
