@@ -41,11 +41,11 @@ def _night(results: Results) -> Iterator[str]:
 
 
 def _gates(results: Results) -> Iterator[str]:
-    held = [
-        ({"gate": outcome.gate, "state": state}, outcome.state is state)
-        for outcome in results.night.outcomes
-        for state in State
-    ]
+    ended: dict[str, State] = {}
+    for outcome in results.night.outcomes:  # a gate may be told twice, as one that failed later on; that counts
+        if ended.get(outcome.gate) is not State.FAILED:
+            ended[outcome.gate] = outcome.state
+    held = [({"gate": gate, "state": state}, own is state) for gate, own in ended.items() for state in State]
     yield from _gauge("gate", "1 for the state in which a gate ended", held)
 
 
