@@ -15,6 +15,7 @@ from typing import Annotated
 
 import tomlkit
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from tomlkit.items import InlineTable
 
 from datasets.errors import UserError
 from datasets.recipe.describe import sentence
@@ -119,7 +120,7 @@ def _entry(entry: Baseline | Waiver) -> str:
     return tomlkit.dumps({"baseline" if isinstance(entry, Baseline) else "waiver": entries})
 
 
-def _inline(values: dict[str, str]) -> tomlkit.items.InlineTable:
+def _inline(values: dict[str, str]) -> InlineTable:
     table = tomlkit.inline_table()
     table.update(values)
     return table

@@ -25,7 +25,11 @@ from pipelines.report.points import PointErrors, point_errors
 from render.sensor.presets import regime_of
 
 EXACT_POINTS = "truth"  # poses of exact points: their errors are rounding, whose size means nothing
-KEY = ("regime", "camera_name", "system")
+KEY = {
+    "regime": "sensor regime",
+    "camera_name": "camera's name in the recipe",
+    "system": "detector, or a solver with its setting",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,9 +82,9 @@ def same_views(one: Dataset, other: Dataset) -> bool:
 
 SCHEMA = pa.schema(
     [
-        *(pa.field(name, pa.string()) for name in KEY),
-        pa.field("frame_id", pa.int64()),
-        pa.field("pose_id", pa.int64()),
+        *(pa.field(name, pa.string(), metadata={"meaning": meaning}) for name, meaning in KEY.items()),
+        pa.field("frame_id", pa.int64(), metadata={"meaning": "frame in the dataset that was measured"}),
+        pa.field("pose_id", pa.int64(), metadata={"meaning": "pose; frames of one pose differ by camera only"}),
         pa.field("failed", pa.bool_(), metadata={"meaning": "no corner found, or in any draw no pose"}),
         *(
             pa.field(metric.name, pa.float64(), metadata={"meaning": metric.meaning, "unit": metric.unit})

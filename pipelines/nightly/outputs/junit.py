@@ -62,7 +62,8 @@ def _reasons(outcome: Outcome, results: Results) -> dict[str, list[str]]:
     for item in outcome.findings:
         reasons[lens_of(item.slice)].append(accuracy.describe([item]))
     for suite, frame in outcome.frames:
-        reasons[results.lens_of_frame(suite, frame) or ""].append(f"frame {frame} of the {suite} suite")
+        for lens in results.lenses_of_frame(suite, frame) or {""}:
+            reasons[lens].append(f"frame {frame} of the {suite} suite")
     return dict(reasons)
 
 

@@ -7,7 +7,7 @@ as well. There are no times of samples in it: the collector's own time is taken,
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from pipelines.nightly.history import finding_rows
 from pipelines.nightly.outputs.results import Results
@@ -41,11 +41,11 @@ def _night(results: Results) -> Iterator[str]:
 
 
 def _gates(results: Results) -> Iterator[str]:
-    held = [
-        ({"gate": outcome.gate, "state": state}, outcome.state is state)
-        for outcome in results.night.outcomes
-        for state in State
-    ]
+    ended: dict[str, State] = {}
+    for outcome in results.night.outcomes:  # a gate may be told twice, as one that failed later on; that counts
+        if ended.get(outcome.gate) is not State.FAILED:
+            ended[outcome.gate] = outcome.state
+    held = [({"gate": gate, "state": state}, own is state) for gate, own in ended.items() for state in State]
     yield from _gauge("gate", "1 for the state in which a gate ended", held)
 
 
@@ -66,7 +66,7 @@ def _counts(results: Results) -> Iterator[str]:
     yield from _gauge("failed_frames", "those that failed", zip(labels, (item.failed for item in counts), strict=True))
 
 
-def _gauge(name: str, meaning: str, samples: Iterator[tuple[Labels, float]] | list[tuple[Labels, float]]) -> list[str]:
+def _gauge(name: str, meaning: str, samples: Iterable[tuple[Labels, float]]) -> list[str]:
     lines = [f"{PREFIX}{name}{_labels(labels)} {_number(value)}" for labels, value in samples]
     return [f"# TYPE {PREFIX}{name} gauge", f"# HELP {PREFIX}{name} {meaning}", *lines] if lines else []
 

@@ -7,16 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from pipelines.nightly.comparison import Verdict
 from pipelines.nightly.gates import fresh
 from pipelines.nightly.judgement import Finding
-from pipelines.nightly.measures import slices
+from pipelines.nightly.measures import KEY, slices
 from pipelines.nightly.record import Night, State
 from pipelines.nightly.suites import FRESH, PINNED
 
-CANDIDATE = "new"  # the side of a table of measures that is judged
+SIDES = BASELINE, CANDIDATE = "old", "new"  # of a table of measures
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +60,8 @@ class Results:
     def counts(self) -> list[SliceCount]:
         """Frames and failed frames of each slice."""
         return [
-            SliceCount(*name.split(" ", 1), item.name, len(item.failed), int(np.sum(item.failed)))
-            for name, table in self.measures.items()
+            SliceCount(suite, side, item.name, len(item.failed), int(np.sum(item.failed)))
+            for (suite, side), table in ((name.split(" ", 1), table) for name, table in self.measures.items())
             for item in slices(table)
         ]
 
@@ -75,11 +74,22 @@ class Results:
         from_findings = {lens_of(item.slice) for items in self.findings.values() for item in items}
         return sorted(from_measures | from_findings)
 
-    def lens_of_frame(self, suite: str, frame: int) -> str | None:
-        """Sensor regime with camera of a frame; None if no table of measures holds it."""
-        table = self.measures.get(f"{suite} {CANDIDATE}")
-        own = None if table is None else table.filter(pc.equal(table["frame_id"], frame))
-        return f"{own['regime'][0]}/{own['camera_name'][0]}" if own else None
+    def lenses_of_frame(self, suite: str, frame: int) -> set[str]:
+        """Sensor regimes with cameras in which a frame of that number fails anew; if in none, those that have one.
+
+        Frames of two regimes have the same numbers, so the number alone does not tell the regime.
+        """
+        before, after = (self._failed(f"{suite} {side}", frame) for side in SIDES)
+        anew = {key for key, failed in after.items() if failed and not before.get(key, False)}
+        return {"/".join(key[:2]) for key in anew or after}
+
+    def _failed(self, name: str, frame: int) -> dict[tuple[str, ...], bool]:
+        """Regime, camera and system to whether a frame failed, of those that have it."""
+        table = self.measures.get(name)
+        if table is None:
+            return {}
+        rows = table.select([*KEY, "failed"]).filter(pa.array(table["frame_id"].to_numpy() == frame)).to_pylist()
+        return {tuple(row[part] for part in KEY): row["failed"] for row in rows}
 
     def _confirmed(self) -> set[tuple[str, str]]:
         """Slice and metric of what gate `fresh` believes, be it accepted or not."""

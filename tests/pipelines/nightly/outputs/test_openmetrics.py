@@ -7,6 +7,7 @@ from prometheus_client import parser as old_format
 from prometheus_client.openmetrics import parser as new_format
 
 from pipelines.nightly.outputs import openmetrics
+from pipelines.nightly.record import Outcome, State
 from tests.pipelines.nightly import simulated
 from tests.pipelines.nightly.whole_nights import results
 
@@ -50,6 +51,14 @@ def test_the_numbers_are_the_nights():
     failed = slice | {"camera": "perspective", "suite": "pinned", "side": "new"}
     assert found[_key("failed_frames", **failed)] == 2
     assert found[_key("frames", **failed)] == 20
+
+
+def test_a_gate_that_is_told_twice_has_one_sample_and_failed_counts():
+    night = results()
+    told = [Outcome("ran", state, "told") for state in (State.PASSED, State.FAILED, State.PASSED)]
+    night = dataclasses.replace(night, night=dataclasses.replace(night.night, outcomes=tuple(told)))
+    assert _samples(night)[_key("gate", gate="ran", state="failed")] == 1
+    assert openmetrics.text(night).count('gate="ran",state="failed"') == 1
 
 
 def test_facts_are_labels_of_the_run():

@@ -16,11 +16,13 @@ def test_lenses_are_regime_and_camera_without_the_system():
     assert results().lenses() == sorted(f"typical/{camera}" for camera in simulated.CAMERAS)
 
 
-def test_the_lens_of_a_frame_is_looked_up():
+def test_the_lens_of_a_frame_is_the_one_in_which_it_fails_anew():
+    """All lenses of the simulated nights number their frames alike, as two regimes do."""
     night = results(failing=(3,))
-    assert night.lens_of_frame("pinned", 3) == "typical/perspective"
-    assert night.lens_of_frame("pinned", 999) is None
-    assert night.lens_of_frame("none", 3) is None
+    assert night.lenses_of_frame("pinned", 3) == {"typical/perspective"}
+    assert night.lenses_of_frame("pinned", 4) == set(night.lenses())
+    assert night.lenses_of_frame("pinned", 999) == set()
+    assert night.lenses_of_frame("none", 3) == set()
 
 
 def test_what_is_worse_comes_first_and_the_largest_of_it():
