@@ -27,8 +27,8 @@ CONTRAST = """selectors => selectors.map(selector => {
   return (high + .05) / (low + .05); })"""
 TEXTS = (
     "h1", ".exit b", ".exit span", ".of span", ".strip b", ".strip span", ".state.passed", ".state.failed",
-    ".state.warned", ".state.changed", ".state.not-run", ".mark.worse", ".mark.unconfirmed", ".mark.unproved", ".mark.equal",
-    ".muted", ".changes a", ".opens", ".detail .mark.equal", "output", ".was", "pre",
+    ".state.warned", ".state.changed", ".state.not-run", ".mark.worse", ".mark.unconfirmed", ".mark.unproved",
+    ".mark.equal", ".muted", ".changes a", ".opens", ".detail .mark.equal", "output", ".was", "pre",
 )  # fmt: skip
 
 
