@@ -52,7 +52,7 @@ addEventListener("DOMContentLoaded", () => {
     }
 
     const words = one("#filter"), kind = one("#kind"), count = one("#count");
-    const changed = ["worse", "better", "unconfirmed"];
+    const changed = ["worse", "better"];
     const filter = () => {
       const wanted = words.value.toLowerCase().split(/\s+/);
       let shown = 0;

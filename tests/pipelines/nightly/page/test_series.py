@@ -29,7 +29,7 @@ def test_each_night_has_its_own_numbers(tmp_path):
 
 def test_changes_and_headlines_are_followed(tmp_path):
     history = synthetic.history(tmp_path, 1, 10)
-    rows = tonight(history.findings(history.run_ids()), [])
+    rows = tonight(history.findings(history.run_ids()))
     found = headlines(rows, rows[:2])
     assert [row.key for row in found[:2]] == [row.key for row in rows[:2]]
     assert len(found) == MOST_TRENDS
