@@ -74,9 +74,9 @@ class Row:
 
     @property
     def change(self) -> str:
-        """The effect with its 95 % interval, to the digits that the interval supports."""
+        """The effect with its 95 % interval, to the digits that the interval supports, two of the effect at most."""
         effect, low, high = (self._shown(value) for value in (self.effect, self.low, self.high))
-        step = high - low if high > low else abs(effect) / 10.0
+        step = max(high - low, abs(effect) / 10.0)
         return f"{rounded(effect, step, True)} [{rounded(low, step, True)}, {rounded(high, step, True)}]"
 
     @property

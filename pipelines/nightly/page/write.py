@@ -26,6 +26,7 @@ from pipelines.report.template import rendered
 FOLDER = Path(__file__).parent
 MOST_NIGHTS = 365
 MOST_PICTURES = 12
+LEAST_ROOM = 60  # nights that the strip has room for, so that a few do not become wide bars
 MOST_TOLD = 5  # nights that were not fine, in words
 COMMAND = "python -m pipelines nightly"
 GATES = {PINNED: accuracy.GATE, FRESH: fresh.GATE}  # suite to the gate that its changes fail
@@ -87,6 +88,7 @@ def _of_night(runs: list[dict[str, Any]]) -> dict[str, Any]:
         "run": run,
         "word": _word(run["exit"]),
         "runs": runs,
+        "room": max(LEAST_ROOM, len(runs)),
         "words": [_word(item["exit"]) for item in runs],
         "ended": ", ".join(f"{count} {word}" for word, count in ended.most_common()),
         "told": [(item, _word(item["exit"])) for item in reversed(others[-MOST_TOLD:])],

@@ -24,6 +24,10 @@ def test_a_change_in_its_unit():
     assert ROW.size == pytest.approx(4.2)
 
 
+def test_an_interval_without_width_does_not_ask_for_digits():
+    assert dataclasses.replace(ROW, low=ROW.effect, high=ROW.effect + 1e-18).change == "+0.0021 [+0.0021, +0.0021]"
+
+
 @pytest.mark.parametrize(("unit", "shown"), [("log px^2", "px²"), ("1", "")])
 def test_logs_are_shown_as_per_cent(unit, shown):
     ends = {name: float(np.log(value)) for name, value in {"effect": 1.22, "low": 1.2, "high": 1.24}.items()}
