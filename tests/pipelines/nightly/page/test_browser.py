@@ -154,6 +154,7 @@ def test_a_frame_opens_large_and_closes(visit):
     assert dialog.is_visible()
     shown, small = (page.locator(f"{where} .sides svg").first.bounding_box() for where in ("dialog", "ul"))
     assert shown["width"] > 2.0 * small["width"]
+    assert "The bar is an error of " in dialog.inner_text()
     page.locator("dialog button").click()
     assert not dialog.is_visible()
 
