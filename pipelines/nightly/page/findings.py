@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
 
+from pipelines.nightly.comparison import holm
+from pipelines.nightly.gates import fresh
 from pipelines.nightly.metrics import METRICS
-from pipelines.nightly.record import State
+from pipelines.nightly.suites import CONFIRMING, FRESH
 
-# A change of the fresh suite that the gate did not confirm on other views, as happens by chance on a few nights.
+# A change on fresh views that a second look on others did not confirm, as happens by chance on a few nights.
 UNCONFIRMED = "unconfirmed"
 ORDER = ("worse", "better", UNCONFIRMED, "unproved", "equal")  # of the page
-CHANGED = ORDER[:3]
+CHANGED = ORDER[:2]
 MOST_CHANGES = 5
 
 
@@ -42,12 +43,19 @@ class Row:
     high: float
     margin: float
     smallest_visible: float
+    p: float
     verdict: str  # one of ORDER
+    again: Row | None = None  # the second look that confirmed a change on fresh views
 
     @property
     def size(self) -> float:
         """The effect in margins, which compares metrics of different units."""
         return abs(self.effect) / self.margin if self.margin > 0.0 else np.inf
+
+    @property
+    def toward_worse(self) -> bool:
+        """Whether the change is one for the worse: a larger error, or a value further from what it should be."""
+        return self.effect > 0.0 if self.unit.startswith("log") else abs(self.new) > abs(self.old)
 
     @property
     def meaning(self) -> str:
@@ -66,9 +74,9 @@ class Row:
 
     @property
     def change(self) -> str:
-        """The effect with its 95 % interval, to the digits that the interval supports."""
+        """The effect with its 95 % interval, to the digits that the interval supports, two of the effect at most."""
         effect, low, high = (self._shown(value) for value in (self.effect, self.low, self.high))
-        step = high - low if high > low else abs(effect) / 10.0
+        step = max(high - low, abs(effect) / 10.0)
         return f"{rounded(effect, step, True)} [{rounded(low, step, True)}, {rounded(high, step, True)}]"
 
     @property
@@ -100,19 +108,15 @@ class Row:
         return 100.0 * float(np.expm1(value)) if self.in_logs else value
 
 
-def tonight(findings: pa.Table, gates: Iterable[dict[str, Any]]) -> list[Row]:
-    """Rows of one run's findings, the changed ones first. gates: the run's, as in `history.RUNS`."""
-    confirmed = any(gate["gate"] == "fresh" and gate["state"] in (State.FAILED, State.WAIVED) for gate in gates)
-    names = ("unit", "poses", "old", "new", "effect", "low", "high", "margin", "smallest_visible")
-    rows = [
-        Row(
-            Key(item["suite"], item["slice"], item["metric"]),
-            **{name: item[name] for name in names},
-            verdict=_verdict(item["suite"], item["verdict"], confirmed),
-        )
-        for item in findings.to_pylist()
-    ]
-    return sorted(rows, key=lambda row: (ORDER.index(row.verdict), -row.size))
+def tonight(findings: pa.Table) -> list[Row]:
+    """Rows of one run's findings, the changed ones first; a second look is told with what it confirms."""
+    rows = [_row(item) for item in findings.to_pylist()]
+    believed = _confirmed(
+        [row for row in rows if row.key.suite == FRESH and row.verdict == "worse"],
+        {row.key[1:]: row for row in rows if row.key.suite == CONFIRMING},
+    )
+    shown = [_judged(row, believed.get(row.key)) for row in rows if row.key.suite != CONFIRMING]
+    return sorted(shown, key=lambda row: (ORDER.index(row.verdict), -row.size))
 
 
 def most_changed(rows: list[Row]) -> list[Row]:
@@ -147,7 +151,27 @@ def rounded(value: float, step: float, signed: bool = False) -> str:
     return text[1:] if float(text) == 0.0 or (text[0] == "+" and not signed) else text
 
 
-def _verdict(suite: str, verdict: str, confirmed: bool) -> str:
-    if suite == "fresh" and (verdict == "better" or (verdict == "worse" and not confirmed)):
-        return UNCONFIRMED
-    return verdict if verdict in ORDER else "unproved"
+def _row(item: dict[str, Any]) -> Row:
+    key = Key(item["suite"], item["slice"], item["metric"])
+    verdict = item["verdict"] if item["verdict"] in ORDER else "unproved"
+    numbers = {name: item[name] for name in Row.__slots__ if name not in ("key", "verdict", "again")}
+    return Row(key, **numbers, verdict=verdict)
+
+
+def _confirmed(flagged: list[Row], second: dict[tuple[str, ...], Row]) -> dict[Key, Row]:
+    """Flagged changes and the second looks that confirm them, found as gate `fresh` does from the same numbers."""
+    looked_at = [(row, second[row.key[1:]]) for row in flagged if row.key[1:] in second]
+    if not looked_at:
+        return {}
+    rejected = holm(np.array([again.p for _, again in looked_at]), fresh.ALPHA)
+    return {
+        row.key: again
+        for (row, again), differs in zip(looked_at, rejected, strict=True)
+        if differs and again.size > 1.0 and again.toward_worse
+    }
+
+
+def _judged(row: Row, again: Row | None) -> Row:
+    if row.key.suite != FRESH or row.verdict not in CHANGED:
+        return row
+    return replace(row, again=again) if again else replace(row, verdict=UNCONFIRMED)

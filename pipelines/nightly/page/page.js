@@ -52,7 +52,7 @@ addEventListener("DOMContentLoaded", () => {
     }
 
     const words = one("#filter"), kind = one("#kind"), count = one("#count");
-    const changed = ["worse", "better", "unconfirmed"];
+    const changed = ["worse", "better"];
     const filter = () => {
       const wanted = words.value.toLowerCase().split(/\s+/);
       let shown = 0;
@@ -93,7 +93,7 @@ addEventListener("DOMContentLoaded", () => {
     button.hidden = false;
     one(".sides", button.parentElement).addEventListener("click", () => button.click());
     button.addEventListener("click", () => {
-      const copies = [one("h3", button.parentElement), one(".sides", button.parentElement)].map((node) => node.cloneNode(true));
+      const copies = ["h3", ".sides", ".bar"].map((name) => one(name, button.parentElement).cloneNode(true));
       for (const node of copies) all("[id]", node).forEach((item) => item.removeAttribute("id"));
       one("div", dialog).replaceChildren(...copies);
       dialog.showModal();

@@ -117,15 +117,18 @@ def _between(low: Array, high: Array) -> str:
     known = np.flatnonzero(np.isfinite(low) & np.isfinite(high))
     found: list[str] = []
     for nights in np.split(known, np.flatnonzero(np.diff(known) > 1) + 1) if len(known) else ():
-        there = _steps(nights, high)
-        back = _steps(nights[::-1], low)
+        there = _steps(nights, high, 0.5)
+        back = _steps(nights[::-1], low, -0.5)
         found.append(f"M{there}L{back}z")
     return "".join(found)
 
 
-def _steps(nights: NDArray[np.intp], y: Array) -> str:
-    """Corners of a step function: a night's value holds from half a night before to half a night after."""
-    values, side = y[nights].tolist(), 0.5 if nights[0] <= nights[-1] else -0.5
+def _steps(nights: NDArray[np.intp], y: Array, side: float) -> str:
+    """Corners of a step function: a night's value holds from half a night before to half a night after.
+
+    side: half a night in the direction of `nights`.
+    """
+    values = y[nights].tolist()
     return " ".join(
         f"{night - side:g} {value:.0f} {night + side:g} {value:.0f}"
         for i, (night, value) in enumerate(zip(nights.tolist(), values, strict=True))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from eposit.arrays import Array, Mask
 from pipelines.nightly.page.findings import Key, Row
+from pipelines.nightly.suites import PINNED
 
 # What a team looks at first, each shown for the slice that is nearest to its margin, which stands for the others.
 HEADLINES = ("corner_log_ms", "corner_nees", "corner_radial", "pose_log_t", "pose_log_R", "pose_nees")
@@ -68,7 +69,7 @@ def headlines(rows: list[Row], changes: list[Row]) -> list[Row]:
     chosen = {row.key: row for row in changes[: MOST_TRENDS // 2]}
     for metric in HEADLINES:
         own = [row for row in rows if row.key.metric == metric]
-        pinned = [row for row in own if row.key.suite == "pinned"] or own
+        pinned = [row for row in own if row.key.suite == PINNED] or own
         if pinned and not any(key.metric == metric for key in chosen):
             nearest = max(pinned, key=lambda row: row.size)
             chosen[nearest.key] = nearest

@@ -69,6 +69,24 @@ def test_an_interval_is_where_its_numbers_are():
     assert [float(low), float(high)] == pytest.approx([middle + per_px * v for v in (ROW.low, ROW.high)], abs=0.1)
 
 
+def test_bands_reach_half_a_night_to_both_sides():
+    """Around a lone night, and around a stretch with a step."""
+    found = plots.trend(_series([np.nan, 1.0, np.nan, 2.0, 2.0, 3.0]), [])
+    scale = plots.FILLED * plots.TREND_HEIGHT / (found.highest - found.lowest)
+    areas = _path(found.inside, "spread").rstrip("z").split("zM")
+    ends = [(1.0, 1.0, 0.5, 1.5), (2.0, 3.0, 2.5, 5.5)]
+    for area, (first, last, left, right) in zip(areas, ends, strict=True):
+        corners = [np.array(part.split(), float).reshape(-1, 2) for part in area.removeprefix("M").split("L")]
+        for side, order in zip(corners, (1, -1), strict=True):  # the upper end there, the lower one back
+            from_left = side[::order]
+            assert from_left[[0, -1], 0].tolist() == [left, right]
+            assert np.all(np.diff(from_left[:, 0]) >= 0.0)
+            ends_at = [found.highest - value - 0.5 * order for value in (first, last)]
+            assert from_left[[0, -1], 1] == pytest.approx(
+                [0.05 * plots.TREND_HEIGHT + e * scale for e in ends_at], abs=0.5
+            )
+
+
 def test_one_night_and_equal_values_are_drawn():
     for values in ([1.0], [1.0, 1.0], [np.nan, 1.0]):
         assert "nan" not in plots.trend(_series(values), []).inside + plots.spark(_series(values))
