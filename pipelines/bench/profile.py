@@ -20,11 +20,12 @@ from pipelines.bench.cases import chosen_frames, image_of, linear_of
 from pipelines.bench.primary_rays import NAME, primary_rays
 from pipelines.bench.table import Row, compared
 from pipelines.bench.timing import in_turn
-from pipelines.detection import CIRCLE_CLEARANCE, SUBPIX_STOP, SUBPIX_WINDOW, detect_points
-from pipelines.detection.board_map import BoardMap, grid
+from pipelines.detection import detect_points
+from pipelines.detection.board_map import grid
 from pipelines.detection.circle import find_circle
 from pipelines.detection.corners import refine_corners
-from pipelines.detection.finders import CLASSIC_FLAGS, find_board, textured_region
+from pipelines.detection.finders import CLASSIC_FLAGS, SUBPIX_STOP, SUBPIX_WINDOW, find_board, textured_region
+from pipelines.detection.first_map import first_map
 
 PART = "profile"
 Call = Callable[[], Any]
@@ -70,11 +71,9 @@ def _detection(image: Any, target: Any) -> Iterator[tuple[str, Call, str, Call]]
     board = find_board(image, target)
     if board is None:
         return
-    at, size = grid(target.inner), (image.shape[1], image.shape[0])
-    clear = np.linalg.norm(at - target.circle_centre[:2] / target.square_mm, axis=1) > CIRCLE_CLEARANCE
-    rough = functools.partial(BoardMap.fit_rough, at, board.corners_px, size, clear)
+    rough = functools.partial(first_map, board.corners_px, (image.shape[1], image.shape[0]), target)
     start = board.corners_px.astype(np.float32).reshape(-1, 1, 2)
-    yield "map from board to image", rough, "its slopes once", functools.partial(rough().slopes, at)
+    yield "map from board to image", rough, "its slopes once", functools.partial(rough().slopes, grid(target.inner))
     subpix = lambda: cv2.cornerSubPix(image, start.copy(), SUBPIX_WINDOW, (-1, -1), SUBPIX_STOP)  # noqa: E731
     yield "corners", functools.partial(refine_corners, image, rough(), target), "cv2.cornerSubPix", subpix
     corners = refine_corners(image, rough(), target)

@@ -5,20 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from eposit.arrays import Array
-from pipelines.detection.board_map import BoardMap, grid
+from pipelines.detection.board_map import grid
 from pipelines.detection.circle import find_circle
-from pipelines.detection.corners import BAD_SHARE, Corners, refine_corners, unrefined
-from pipelines.detection.finders import Grey, find_board, find_sector_based
+from pipelines.detection.consistency import BAD_SHARE, Corners, check_placed
+from pipelines.detection.corners import refine_corners
+from pipelines.detection.finders import Grey, find_board, find_sector_based, subpix
+from pipelines.detection.first_map import first_map
 from render.targets.chessboard import Chessboard
-
-CIRCLE_CLEARANCE = 1.3  # squares from the circle's foot within which the first, rough corners are not trusted
-SUBPIX_WINDOW = (5, 5)
-SUBPIX_STOP = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 40, 1e-3)
 
 
 class Detector(StrEnum):
@@ -85,17 +82,12 @@ def detect_points(image: Grey, target: Chessboard, detector: str = Detector.EDGE
 
 
 def _corners(image: Grey, found_px: Array, target: Chessboard, detector: str) -> Corners:
-    at, size = grid(target.inner), (image.shape[1], image.shape[0])
-    foot = target.circle_centre[:2] / target.square_mm
-    clear = np.linalg.norm(at - foot, axis=1) > CIRCLE_CLEARANCE
-    fitted = refine_corners(image, BoardMap.fit_rough(at, found_px, size, clear), target)
+    size = (image.shape[1], image.shape[0])
+    fitted = refine_corners(image, first_map(found_px, size, target), target)
     if detector == Detector.EDGE_FIT or not np.any(fitted.consistent):
         return fitted
-    placed = found_px
-    if detector == Detector.OPENCV_SUBPIX:
-        start = found_px.astype(np.float32).reshape(-1, 1, 2)
-        placed = cv2.cornerSubPix(image, start, SUBPIX_WINDOW, (-1, -1), SUBPIX_STOP).reshape(-1, 2).astype(np.float64)
-    return unrefined(placed, fitted, at, size)
+    placed = subpix(image, found_px) if detector == Detector.OPENCV_SUBPIX else found_px
+    return check_placed(placed, fitted, grid(target.inner), size)
 
 
 def _nothing(count: int, status: PointStatus, finder: str) -> Detection:

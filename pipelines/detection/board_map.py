@@ -16,10 +16,7 @@ START_CORNERS = 16  # that a start is worked out from
 FIT_STEPS = 100
 FREE = np.array([0.0, 2e-2, 100.0, 100.0, 0.3, 0.3, 0.3])  # how far a lens may lie from the start: see `generic_lens`
 HOLD_SHARE = 1e-6  # weight of that against one pixel of one corner: it decides only what nothing else does
-FIRM_HOLD = 1.0
 BEND_STEP = 0.05  # squares; second differences at this step are good to 1e-5 px
-OUTLIER_PX = 1.5  # a worst corner farther off than this has all corners weighed by their distances
-GENTLE_PX = 0.5  # distance at which such a weight is one half
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,15 +48,6 @@ class BoardMap:
         x, y = (np.ascontiguousarray(column) for column in at.T)
         pixels = np.where(weights[:, None] > 0.0, corners_px, 0.0)
         return BoardMap(*generic_lens.fit(begin.R, begin.t, begin.lens, x, y, pixels, weights, held, FIT_STEPS))
-
-    @staticmethod
-    def fit_rough(at: Array, corners_px: Array, size: tuple[int, int], use: Mask) -> BoardMap:
-        """The map through corners of which some may be a few pixels off."""
-        board = BoardMap.fit(at, corners_px, size, use.astype(np.float64), hold=FIRM_HOLD)
-        distance = np.linalg.norm(board(at) - corners_px, axis=1)
-        if distance[use].max() <= OUTLIER_PX:
-            return board
-        return BoardMap.fit(at, corners_px, size, use / (1.0 + (distance / GENTLE_PX) ** 2), board, FIRM_HOLD)
 
     def __call__(self, at: Array, height: float = 0.0) -> Array:
         """(m, 2) or (2,) points in squares, `height` squares above the board, to (m, 2) or (2,) px."""

@@ -22,6 +22,8 @@ ENLARGEMENT = 3.0  # the classic finder needs squares of about 10 px; tilted one
 LEAST_ENLARGEMENT, MOST_PIXELS = 1.3, 8e6  # of an enlarged region; larger ones take seconds
 CLASSIC_FLAGS = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
 SECTOR_FLAGS = cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_EXHAUSTIVE
+SUBPIX_WINDOW = (5, 5)
+SUBPIX_STOP = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 40, 1e-3)
 UNCHECKED_PIXELS = 6e5  # up to which a finder may try everything
 DECIMATION = 4  # of the picture in which texture is looked for
 REGION_MARGIN_PX = 16
@@ -53,6 +55,12 @@ def find_sector_based(image: Grey, target: Chessboard) -> Found | None:
     corners = _sector_based(image, target.inner)
     ordered = None if corners is None else _ordered(image, corners.reshape(-1, 2), target)
     return None if ordered is None else Found(ordered, "sector")
+
+
+def subpix(image: Grey, corners_px: Array) -> Array:
+    """Corners (n, 2) px as `cv2.cornerSubPix` moves them."""
+    start = corners_px.astype(np.float32).reshape(-1, 1, 2)
+    return cv2.cornerSubPix(image, start, SUBPIX_WINDOW, (-1, -1), SUBPIX_STOP).reshape(-1, 2).astype(np.float64)
 
 
 def _classic(image: Grey, inner: tuple[int, int]) -> Array | None:

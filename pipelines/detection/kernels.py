@@ -9,16 +9,16 @@ Loops are written out in these functions: NumPy's expressions, slices and linear
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Callable
-from pathlib import Path
+from functools import cache
 from typing import Any, TypeVar
 
 import numba
-from numba.core import config
+
+from pipelines.detection.kernel_cache import choose_folder, numba_keeps_in
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+_folder = cache(choose_folder)
 
 
 def compiled(function: Function) -> Function:
@@ -38,27 +38,11 @@ def inlined(function: Function) -> Function:
 
 
 def _kept(function: Any, **options: Any) -> Any:
-    """Compiled, and kept for later runs: beside the source, else in the user's own cache, else in a folder of this user
-    among the temporary files, else not at all."""
+    """Compiled, and kept for later runs where a folder can be written."""
     options |= {"no_cfunc_wrapper": True, "error_model": "numpy"}  # a wrapper that nobody calls takes time to compile
     jit: Any = numba.njit
-    try:
+    folder = _folder()
+    if folder is None:
+        return jit(**options)(function)
+    with numba_keeps_in(folder):
         return jit(cache=True, **options)(function)
-    except RuntimeError:  # Numba can write neither beside the source nor in the user's cache
-        folder = own_temporary_folder()
-        if folder is None:
-            return jit(**options)(function)
-        config.CACHE_DIR = str(folder)  # pyright: ignore[reportAttributeAccessIssue]
-        return jit(cache=True, **options)(function)
-
-
-def own_temporary_folder() -> Path | None:
-    """A folder among the temporary files that only this user can write; None if somebody else has it."""
-    folder = Path(tempfile.gettempdir()) / f"eposit-kernels-{os.getuid() if hasattr(os, 'getuid') else 'own'}"
-    try:
-        folder.mkdir(mode=0o700, exist_ok=True)
-        found = folder.stat()
-    except OSError:
-        return None
-    mine = not hasattr(os, "getuid") or (found.st_uid == os.getuid() and found.st_mode & 0o077 == 0)
-    return folder if mine and not folder.is_symlink() else None

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipelines.detection.corner_model import BLUR, SHAPE, CornerTask, fit_corners
-from pipelines.detection.corners import REACH, STOP, WINDOW_PX
+from pipelines.detection.corners import FINAL, REACH, STOP
 from tests.supersampled import digitised, picture, side
 
 HALF = 12  # of a tile, px
@@ -88,7 +88,7 @@ def fitted(image, corners, scene, rng, start_px=0.3, **changed):
         "disc_axes": np.eye(2),
         **changed,
     }
-    task = CornerTask(shapes=shapes, inverses=np.tile(inverse, (n, 1, 1)), window=WINDOW_PX, **given)
+    task = CornerTask(shapes=shapes, inverses=np.tile(inverse, (n, 1, 1)), window=FINAL.window_px, **given)
     shapes, covariance, noise, converged = fit_corners(image, task, STEPS, STOP)
     return shapes[:, :2] - middles - corners, shapes, covariance * noise[:, None, None], noise, converged
 

@@ -1,79 +1,137 @@
-"""The bits do not depend on what is compiled, in which order, or loaded; and compiled functions are always kept."""
+"""Compiled functions are kept for later runs, and never loaded after any source of the package has changed."""
 
 import os
+import shutil
 import subprocess
 import sys
+import time
 
-from pipelines.detection.kernels import own_temporary_folder
+import pytest
 
-CODE = """
-import hashlib, sys
-from pipelines.detection import prepare
-for index in map(int, sys.argv[1:]):
-    prepare.MODULES[index].prepare()
-from pipelines.detection import detect_points
-from tests.pipelines.detection import test_circle, test_finders
+from pipelines.detection import kernel_cache
+from pipelines.detection.kernel_cache import PREFIX, choose_folder, own_temporary_folder
 
-image, _ = test_finders.drawn(26.0, 20.0)
-found = detect_points(image, test_finders.TARGET)
-assert (found.status[:-1] == "ok").all(), found.status
-circle = test_circle.found_in(*test_circle.board_with("tilted"))
-digest = hashlib.sha256(found.points_px.tobytes() + found.covariance_px2.tobytes())
-digest.update(circle.centre_px.tobytes() + circle.covariance_px2.tobytes())
-print(digest.hexdigest())
+PART = """
+from pipelines.detection.kernels import inlined
+
+@inlined
+def part(x: float) -> float:
+    return x + 1.0
 """
+CALLER = """
+from pipelines.detection.kernels import compiled
+from pipelines.detection.part import part
+
+@compiled
+def whole(x: float) -> float:
+    return part(x)
+"""
+CODE = "from pipelines.detection.caller import whole; print(whole(1.0), len(whole.stats.cache_hits))"
 
 
-def digest(cache, *order):
-    """Of what a new process finds that first compiles or loads the modules of these numbers, in this order."""
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(cache)}
-    command = [sys.executable, "-c", CODE, *map(str, order)]
-    return subprocess.run(command, capture_output=True, text=True, check=True, env=environment).stdout
+@pytest.fixture
+def checkout(tmp_path):
+    """A package that compiles one small function, which calls one in another file, by our decorators."""
+    package = tmp_path / "checkout/pipelines/detection"
+    package.mkdir(parents=True)
+    for folder in (package, package.parent):
+        (folder / "__init__.py").touch()
+    for name in ("kernels.py", "kernel_cache.py"):
+        shutil.copy(kernel_cache.PACKAGE / name, package)
+    (package / "part.py").write_text(PART)
+    (package / "caller.py").write_text(CALLER)
+    return package
 
 
-def test_bits_are_the_same_compiled_in_any_order_and_loaded(tmp_path):
-    """Let the compiler reorder sums (`fastmath`), and the three first ones differ from each other by 1e-13 px."""
-    found = [digest(tmp_path / "one"), digest(tmp_path / "two", 0, 1, 2, 3), digest(tmp_path / "two")]
-    assert any((tmp_path / "one").rglob("*.nbc"))
-    assert len(set(found)) == 1
+def run(package, **environment):
+    """What the package's function gives for 1 in a new process, and how often machine code was loaded for it."""
+    root = package.parents[1]
+    own = {"HOME": str(root / "home"), "TMPDIR": str(root / "tmp")} | environment
+    (root / "tmp").mkdir(exist_ok=True)
+    rest = {name: value for name, value in os.environ.items() if not name.startswith(("NUMBA_", "XDG_"))}
+    command = [sys.executable, "-c", CODE]
+    done = subprocess.run(command, capture_output=True, text=True, env=rest | own, cwd=root)
+    assert done.returncode == 0, done.stderr
+    value, loaded = done.stdout.split()
+    return float(value), int(loaded)
 
 
-def test_everything_is_compiled_before_the_first_picture():
-    code = (
-        "import numba.core.event as event\n"
-        "from pipelines.detection.prepare import compile_kernels\n"
-        "compile_kernels()\n"
-        "from pipelines.detection import circle, circle_model, corner_model, generic_lens\n"
-        "modules = circle, circle_model, corner_model, generic_lens\n"
-        "kernels = {f for m in modules for f in vars(m).values() if hasattr(f, 'signatures')}\n"
-        "before = {f: list(f.signatures) for f in kernels}\n"
-        "from tests.pipelines.detection import test_circle, test_finders\n"
-        "from pipelines.detection import detect_points\n"
-        "detect_points(test_finders.drawn(26.0, 20.0)[0], test_finders.TARGET)\n"
-        "test_circle.found_in(*test_circle.board_with('tilted'))\n"
-        "assert before == {f: list(f.signatures) for f in kernels}\n"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True)
+def kept_in(folder):
+    """Folders for sources there, that hold machine code."""
+    return {path for path in folder.glob(PREFIX + "*") if list(path.rglob("*.nbc"))}
 
 
-def test_where_nothing_can_be_kept_beside_the_source_the_user_has_a_folder(tmp_path, monkeypatch):
-    """As another user on a read-only checkout without a home: Numba alone raises `cannot cache function`."""
-    monkeypatch.setenv("TMPDIR", str(tmp_path))
-    code = (
-        "from numba.core import caching\n"
-        "class Nowhere:\n"
-        "    @classmethod\n"
-        "    def from_function(cls, function, path):\n"
-        "        return None\n"
-        "caching.CacheImpl._locator_classes = [caching.UserProvidedCacheLocator, Nowhere]\n"
-        "from pipelines.detection.kernels import compiled\n"
-        "from pipelines.detection.cholesky import solve_damped\n"
-        "import numpy as np\n"
-        "from pipelines.detection import generic_lens as g\n"
-        "g.project(np.eye(3), np.ones(3), np.ones(7), np.ones(1), np.ones(1), 0.0, np.empty((1, 2)))\n"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True)
-    assert list(tmp_path.glob("eposit-kernels-*/**/*.nbc"))
+def test_a_change_in_another_file_is_seen(checkout):
+    """Numba alone looks at the caller's file only, and loads 2 again."""
+    assert run(checkout) == (2.0, 0)
+    assert run(checkout) == (2.0, 1)
+    first = kept_in(checkout / "__pycache__")
+    assert len(first) == 1
+    (checkout / "part.py").write_text(PART.replace("1.0", "2.0"))
+    assert run(checkout) == (3.0, 0)
+    (checkout / "part.py").write_text(PART)
+    assert run(checkout) == (2.0, 1)
+    assert kept_in(checkout / "__pycache__") > first  # neither folder is a day old
+
+
+def test_a_folder_that_the_user_has_set_is_kept_to(checkout, tmp_path):
+    assert run(checkout, NUMBA_CACHE_DIR=str(tmp_path / "set")) == (2.0, 0)
+    assert len(kept_in(tmp_path / "set")) == 1
+    assert not kept_in(checkout / "__pycache__")
+
+
+def test_a_read_only_checkout_has_the_users_folder_and_else_a_temporary_one(checkout):
+    """A file where a folder should be stops root too. Numba alone raises `cannot cache function` without a home."""
+    (checkout / "__pycache__").touch()
+    root = checkout.parents[1]
+    assert [run(checkout), run(checkout)] == [(2.0, 0), (2.0, 1)]
+    assert len(kept_in(root / "home/.cache/numba")) == 1
+    (root / "file").touch()
+    nowhere = str(root / "file")
+    assert [run(checkout, HOME=nowhere), run(checkout, HOME=nowhere)] == [(2.0, 0), (2.0, 1)]
+    (own,) = (root / "tmp").glob("eposit-kernels-*")
+    assert len(kept_in(own)) == 1
+
+
+def test_where_nothing_can_be_written_functions_are_compiled_all_the_same(checkout):
+    (checkout / "__pycache__").touch()
+    root = checkout.parents[1]
+    (root / "home").touch()
+    (root / "tmp").mkdir()
+    for name in ("own", str(os.getuid()) if hasattr(os, "getuid") else "own"):
+        (root / f"tmp/eposit-kernels-{name}").touch()
+    assert run(checkout) == (2.0, 0)
+
+
+def test_options_and_files_that_shape_the_code_have_a_folder_each(checkout, monkeypatch):
+    first = choose_folder(checkout)
+    assert choose_folder(checkout) == first
+    monkeypatch.setattr(kernel_cache.config, "BOUNDSCHECK", 1)
+    second = choose_folder(checkout)
+    (checkout / "more.py").touch()
+    assert len({first, second, choose_folder(checkout)}) == 3
+
+
+def test_folders_that_nothing_was_added_to_for_a_day_go_when_a_new_one_is_made(checkout, monkeypatch):
+    monkeypatch.setattr(kernel_cache.config, "CACHE_DIR", "")
+    place = checkout / "__pycache__"
+    long_ago = time.time() - 2 * kernel_cache.OLD_S
+    old, used, other = place / f"{PREFIX}old", place / f"{PREFIX}used", place / "other"
+    for folder in (old, used, other):
+        (folder / "detection").mkdir(parents=True)
+        (folder / "detection/whole.nbc").touch()
+        for path in (folder / "detection", folder):
+            os.utime(path, (long_ago, long_ago))
+    os.utime(old / "detection/whole.nbc", (long_ago, long_ago))
+    new = choose_folder(checkout)
+    assert set(place.iterdir()) == {used, other, new}
+
+
+def test_what_other_packages_keep_stays_where_it_was(checkout):
+    before = kernel_cache.config.CACHE_DIR
+    with kernel_cache.numba_keeps_in(checkout):
+        assert str(checkout) == kernel_cache.config.CACHE_DIR
+    assert before == kernel_cache.config.CACHE_DIR
 
 
 def test_a_folder_of_somebody_else_is_not_used(tmp_path, monkeypatch):
@@ -83,20 +141,3 @@ def test_a_folder_of_somebody_else_is_not_used(tmp_path, monkeypatch):
     assert folder.stat().st_mode & 0o077 == 0
     folder.chmod(0o777)
     assert own_temporary_folder() is None
-
-
-def test_compiling_is_told_only_where_nothing_was_kept(tmp_path, monkeypatch):
-    """A thread's `must_compile` is true with an empty cache, false with a full one; left early, it ends early."""
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    code = (
-        "from pipelines.detection import prepare\n"
-        "prepare.MODULES = prepare.MODULES[2:]\n"  # the quickest
-        "with prepare.Kernels() as kernels:\n"
-        "    print(kernels.must_compile())\n"
-        "    kernels.finish()\n"
-        "    print(kernels.must_compile())\n"
-    )
-    command = [sys.executable, "-c", code]
-    cold, warm = (subprocess.run(command, capture_output=True, text=True, check=True).stdout for _ in range(2))
-    assert cold.split() == ["True", "False"]
-    assert warm.split() == ["False", "False"]

@@ -1,0 +1,28 @@
+"""The pixels of a board that the raised circle or its shade may spoil, which no corner's fit may use."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from eposit.arrays import Array
+from pipelines.detection.board_map import BoardMap
+from render.targets.chessboard import Chessboard
+
+MARGIN_PX = 2.5  # kept clear around the circle and its shade: three times a sharp picture's blur
+FARTHEST_PARALLAX = 3.0  # heights of the circle: a larger one is an ambiguous map's invention
+SMALL_PARALLAX = 0.3  # squares: up to here the circle may be displaced either way, which a small tilt leaves open
+
+
+def ellipses_around_circle(board: BoardMap, target: Chessboard) -> tuple[Array, Array]:
+    """Ellipses of one form: at the circle's foot, and where its height may displace it.
+
+    Returns their centres (k, 2) px, k from 1 to 3, and the map (2, 2) from px to the unit circle of such an ellipse.
+    """
+    foot, height = target.circle_centre[:2] / target.square_mm, target.circle_height_mm / target.square_mm
+    base, jacobian = board(foot), board.jacobian(foot)
+    inverse = np.linalg.inv(jacobian)
+    parallax = board(foot, height) - base
+    squares = float(np.linalg.norm(inverse @ parallax))
+    ways = [0.0] if squares > FARTHEST_PARALLAX * height else [0.0, 1.0, -1.0][: 3 if squares <= SMALL_PARALLAX else 2]
+    radius = target.circle_radius_mm / target.square_mm + MARGIN_PX * np.linalg.norm(inverse, axis=1).max()
+    return base + np.array(ways)[:, None] * parallax, inverse / radius

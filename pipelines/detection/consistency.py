@@ -1,0 +1,93 @@
+"""Corners of one board against each other: each must agree with the map through the others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from eposit.arrays import Array, Mask
+from pipelines.detection.board_map import BoardMap
+
+LIMIT_PX = 0.5  # largest distance of a corner from the map through the others
+LIMIT_SHARE = 0.03  # or this share of the local square, whichever is more
+LIMIT_SPREADS, MOST_SHARE = 4.0, 0.15  # or so many median distances, up to this share of the local square
+BAD_SHARE = 0.1  # of the corners that may be inconsistent before the board is
+PRIOR_FREEDOM = 10.0  # degrees of freedom with which the pixels' own noise counts against the corners' scatter
+
+
+@dataclass(frozen=True, slots=True)
+class Corners:
+    """Corners of one picture in the order of `Chessboard.corners`."""
+
+    points_px: Array  # (n, 2)
+    covariance_px2: Array  # (n, 2, 2)
+    consistent: Mask  # (n,) converged, and agrees with the map through the others
+    blur_px: float  # median blur of the edges
+    contrast: float  # median difference between white and black, grey values
+    board: BoardMap  # through the consistent ones
+
+
+def drop_inconsistent(corners: Corners, at: Array, size: tuple[int, int], prior: float = PRIOR_FREEDOM) -> Corners:
+    """Drop the corner farthest from the map through the others until all the rest agree; scale the covariances."""
+    good, points = corners.consistent.copy(), corners.points_px
+    side = np.sqrt(np.abs(np.linalg.det(corners.board.jacobian(at))))
+    board = corners.board
+    for _ in range(int(BAD_SHARE * len(points)) + 1):
+        if 2 * np.sum(good) <= board.slopes(at).shape[-1]:
+            return replace(corners, consistent=np.zeros(len(at), bool))
+        weights = _weights(corners.covariance_px2, good)
+        board = BoardMap.fit(at, points, size, weights, board)
+        distance = _left_out(points, board, at, weights)
+        spread = LIMIT_SPREADS * float(np.median(distance[good]))
+        limit = np.maximum(np.maximum(LIMIT_PX, LIMIT_SHARE * side), np.minimum(spread, MOST_SHARE * side))
+        excess = np.where(good, distance / limit, 0.0)
+        worst = int(np.argmax(excess))
+        if excess[worst] <= 1.0:
+            break
+        good[worst] = False
+    factor = _scatter(corners, board, at, good, prior)
+    return replace(corners, covariance_px2=corners.covariance_px2 * factor, consistent=good, board=board)
+
+
+def check_placed(points_px: Array, fitted: Corners, at: Array, size: tuple[int, int]) -> Corners:
+    """Corners that something else placed, (n, 2) px, checked as our own are; blur and contrast are those of our fit.
+
+    Nothing is known of their uncertainties but the scatter about the map, the same for all.
+    """
+    same = np.repeat(np.eye(2)[None], len(at), axis=0)
+    started = replace(fitted, points_px=points_px, covariance_px2=same, consistent=np.ones(len(at), bool))
+    return drop_inconsistent(started, at, size, prior=0.0)
+
+
+def _weights(covariance: Array, good: Mask) -> Array:
+    """(n,) inverse mean variances, relative to the median one."""
+    variance = np.where(good, 0.5 * np.trace(covariance, axis1=1, axis2=2), np.inf)
+    return np.median(variance[good]) / variance
+
+
+def _left_out(points: Array, board: BoardMap, at: Array, weights: Array) -> Array:
+    """(n,) distance of each corner from the map fitted to the others, px."""
+    slopes = board.slopes(at)
+    scaled = (slopes * np.sqrt(weights)[:, None, None]).reshape(-1, slopes.shape[-1])
+    leverage = _leverage(scaled).reshape(-1, 2).max(axis=1)
+    return np.linalg.norm(points - board(at), axis=1) / np.maximum(1.0 - leverage, 1e-3)
+
+
+def _scatter(corners: Corners, board: BoardMap, at: Array, use: Mask, prior: float) -> float:
+    """Mean square of the corners' distances from the map, in units of their covariances.
+
+    What the pixels' noise cannot tell is in here: rounding that runs along an edge, and what a model leaves out.
+    """
+    whitener = np.linalg.cholesky(np.linalg.inv(corners.covariance_px2[use])).transpose(0, 2, 1)
+    residuals = (whitener @ (corners.points_px - board(at))[use][..., None]).ravel()
+    slopes = (whitener @ board.slopes(at)[use]).reshape(len(residuals), -1)
+    free = len(residuals) - float(_leverage(slopes).sum())
+    return float((np.sum(residuals**2) + prior) / (free + prior))
+
+
+def _leverage(slopes: Array) -> Array:
+    """(m,) diagonal of the hat matrix of (m, k) rows, of which some columns may say the same."""
+    size = np.linalg.norm(slopes, axis=0)
+    left, singular, _ = np.linalg.svd(slopes / np.where(size > 0.0, size, 1.0), full_matrices=False)
+    return np.sum(left[:, singular > 1e-9 * singular[0]] ** 2, axis=1)
