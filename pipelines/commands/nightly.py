@@ -138,6 +138,10 @@ def _settings(names: list[str]) -> tuple[Any, ...]:
 
 
 def _print_night(night: Night, history: Path) -> None:
+    from pipelines.nightly.night import ENDED_WAIVERS
+
+    if ended := dict(night.facts).get(ENDED_WAIVERS):
+        typer.echo(ended, err=True)
     rows = [(item.gate, item.state, item.sentence) for item in night.outcomes]
     print_table((Column("gate"), Column("state"), Column("what was found")), rows)
     typer.echo(f"\nexit {int(night.exit)}, {night.sentence}\nrun {night.run_id}, page {history / 'report.html'}")

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,9 @@ from pipelines.nightly.record import Night
 
 SCHEMA_VERSION = "1"
 LATEST = "latest"
+ADVICE = "move it away, or restore it from a backup"
 _TEXT = pa.string()
+_TIMES = ("ratio", "low", "high", "old_ms", "new_ms")
 _PAIRS = pa.list_(pa.struct([("name", _TEXT), ("value", _TEXT)]))
 
 
@@ -42,12 +45,22 @@ RUNS = pa.schema(
         _field("baseline", _TEXT, "baseline that the run was compared with"),
         _field("exit", pa.int32(), "exit code: 0 fine, 1 worse, 3 no verdict, 4 could not run"),
         _field("sentence", _TEXT, "the run in one sentence"),
-        _field("facts", _PAIRS, "commit, versions, processor, BLAS kernel"),
-        _field("data", _PAIRS, "suite and the content hash of its frames"),
+        _field("facts", _PAIRS, "commit, versions, processor, BLAS kernel; waivers that have ended"),
+        _field(
+            "data",
+            _PAIRS,
+            "what was read, and its content hash: `pinned` and each suite with its regime, the pictures; `replay` with "
+            "a suite and a setting, poses from unchanged points; `code`, the candidate's source files",
+        ),
         _field(
             "gates",
             pa.list_(pa.struct([("gate", _TEXT), ("state", _TEXT), ("sentence", _TEXT)])),
             "how each gate ended, in their order",
+        ),
+        _field(
+            "speed",
+            pa.list_(pa.struct([("stage", _TEXT), *((name, pa.float64()) for name in _TIMES)])),
+            "processor time of each stage, candidate over baseline: ratio, smallest, largest; ms a frame, old and new",
         ),
         _field("measures", _PAIRS, "suite and side (old or new), and the digest of their table in `measures`"),
     ],
@@ -57,7 +70,7 @@ RUNS = pa.schema(
 FINDINGS = pa.schema(
     [
         _field("run_id", _TEXT, "run"),
-        _field("suite", _TEXT, "pinned or fresh"),
+        _field("suite", _TEXT, "pinned, fresh, or confirming: the second look at what changed in fresh"),
         _field("slice", _TEXT, "sensor regime / camera / system"),
         _field("metric", _TEXT, "what is compared"),
         _field("unit", _TEXT, "unit of the numbers; `1` and `log` are pure numbers"),
@@ -107,6 +120,16 @@ class History:
         if not path.is_file():
             _write(path, measures)
         return digest
+
+    def check(self) -> None:
+        """Whether the files of all runs can be opened, which costs less than a night that cannot be shown.
+
+        Raises:
+            UserError: one is damaged.
+        """
+        for run_id in self.run_ids():
+            for kind in ("runs", "findings"):
+                _open(self.root / kind / f"{run_id}.parquet")
 
     def runs(self) -> pa.Table:
         """All runs, the oldest first: columns of `RUNS`."""
@@ -160,17 +183,27 @@ class History:
         return pa.concat_tables(tables) if tables else schema.empty_table()
 
 
-def _read(path: Path, schema: pa.Schema | None = None) -> pa.Table:
-    advice = "move it away, or restore it from a backup"
+def _open(path: Path) -> pq.ParquetFile:
     try:
-        table = pq.ParquetFile(path).read()
+        return pq.ParquetFile(path)
     except FileNotFoundError:
-        raise UserError(f"{path} is missing; {advice}") from None
+        raise UserError(f"{path} is missing; {ADVICE}") from None
     except (OSError, pa.ArrowException) as error:
-        raise UserError(f"{path} is not a readable Parquet file ({error}); {advice}") from None
+        raise _damaged(path, error) from None
+
+
+def _read(path: Path, schema: pa.Schema | None = None) -> pa.Table:
+    try:
+        table = _open(path).read()
+    except (OSError, pa.ArrowException) as error:
+        raise _damaged(path, error) from None
     if schema is not None and not table.schema.equals(schema):
-        raise UserError(f"{path} has other columns than this version writes; {advice}")
+        raise UserError(f"{path} has other columns than this version writes; {ADVICE}")
     return table
+
+
+def _damaged(path: Path, error: Exception) -> UserError:
+    return UserError(f"{path} is not a readable Parquet file ({error}); {ADVICE}")
 
 
 def _write(path: Path, table: pa.Table) -> None:
@@ -192,6 +225,7 @@ def _run_row(night: Night, digests: list[tuple[str, str]]) -> pa.Table:
         "facts": _pairs(night.facts),
         "data": _pairs(night.data),
         "gates": [{"gate": o.gate, "state": o.state, "sentence": o.sentence} for o in night.outcomes],
+        "speed": [asdict(item) for item in night.timings],
         "measures": _pairs(digests),
     }
     return pa.Table.from_pylist([row], schema=RUNS)

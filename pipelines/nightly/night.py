@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import datetime
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import pyarrow as pa
@@ -22,20 +22,20 @@ from pipelines.machine import provenance
 from pipelines.nightly import suites
 from pipelines.nightly.accepted import Baseline
 from pipelines.nightly.baselines import FILE_NAME, Baselines, load
+from pipelines.nightly.found import BASELINE, RAN, Found
 from pipelines.nightly.gates import accuracy, data, failures, fresh, regenerate, replay, speed, tail
 from pipelines.nightly.history import History, new_run_id
-from pipelines.nightly.judgement import Finding, Judgement, judge
-from pipelines.nightly.other_code import ROOT, Code, OtherCodeError, freeze
+from pipelines.nightly.judgement import Judgement, judge
+from pipelines.nightly.other_code import ROOT, Code, freeze
 from pipelines.nightly.outputs import write_all
 from pipelines.nightly.outputs.results import Results
 from pipelines.nightly.page.write import write_page
-from pipelines.nightly.record import Exit, Night, Outcome, State
+from pipelines.nightly.record import Exit, Night, Outcome, State, Timing
 from pipelines.stages.settings import Setting
 
-RAN, BASELINE = "ran", "baseline"
 WORK_PREFIX = ".work-"
+ENDED_WAIVERS = "ended waivers"  # name of a fact
 ORDER = ("data", "regenerate", "replay", "accuracy", "fresh", "failures", "tail", "speed")
-NUMBERS_NEED = ("data", "regenerate")  # gates without which the later ones would compare other things
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,20 +49,6 @@ class Request:
     solvers: tuple[Setting, ...] = ()  # systems beside ours, judged on the pinned pictures
     workers: int = 1
     without: tuple[str, ...] = ()  # gates that are left out
-
-
-@dataclass(slots=True)
-class Found:
-    """What a night has found so far."""
-
-    outcomes: list[Outcome] = field(default_factory=list)
-    findings: dict[str, Sequence[Finding]] = field(default_factory=dict)  # by suite
-    measures: dict[str, pa.Table] = field(default_factory=dict)  # by suite and side
-    data: dict[str, str] = field(default_factory=dict)  # what was read, and its digest
-
-    def stopped(self) -> bool:
-        """Whether a gate has failed that the later ones stand on."""
-        return any(item.state is State.FAILED and item.gate in (RAN, BASELINE, *NUMBERS_NEED) for item in self.outcomes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,95 +73,116 @@ class Desk:
 
 
 def run_night(request: Request, console: Console) -> Night:
-    """Run a night and append it to the history.
+    """Run a night and append it to the history. An error in a gate is that gate's outcome, with exit code 4.
 
     Raises:
-        UserError: wrong use: a recipe, regime, solver or `baselines.toml` that is not usable, or a folder that cannot
-            be written.
+        UserError: wrong use: a recipe, regime, solver or `baselines.toml` that is not usable, a damaged history, or a
+            folder that cannot be written.
     """
     started = datetime.datetime.now(datetime.UTC)
     wanted = suites.suites(suites.PINNED, request.recipe, request.regimes)
     baselines, history = load(request.history / FILE_NAME), History(request.history)
-    has_baseline = any(item.recipe == request.recipe for item in baselines.baselines)
-    baseline = baselines.current(request.recipe) if has_baseline else None
+    history.check()
+    baseline = next((item for item in reversed(baselines.baselines) if item.recipe == request.recipe), None)
     found = Found(data={"code": freeze(request.history / "code").name})
     with _work_folder(request.history) as work:
-        desk = Desk(request, history, work, baselines, LocalEngine(request.workers), console)
-        try:
-            _judge_all(desk, wanted, baseline, found)
-        except (UserError, OtherCodeError) as error:
-            found.outcomes.append(Outcome(RAN, State.FAILED, f"could not run: {error}", Exit.COULD_NOT_RUN))
-    left = [gate for gate in ORDER if gate not in {item.gate for item in found.outcomes}]
-    found.outcomes += [Outcome(gate, State.NOT_RUN, "nothing to judge") for gate in left]
-    night = Night(
-        new_run_id(started), started, request.recipe, baseline.name if baseline else "", tuple(facts()),
-        tuple(found.data.items()), tuple(found.outcomes),
-    )  # fmt: skip
-    history.append(night, found.findings, accuracy.ALPHA, found.measures)
-    write_all(Results(night, found.findings, accuracy.ALPHA, found.measures), request.history)
-    write_page(history, night.run_id, request.history / "report.html")
+        _judge_all(Desk(request, history, work, baselines, LocalEngine(request.workers), console), wanted, found)
+        left = [gate for gate in ORDER if gate not in {item.gate for item in found.outcomes}]
+        found.outcomes += [Outcome(gate, State.NOT_RUN, "nothing to judge") for gate in left]
+        night = Night(
+            new_run_id(started), started, request.recipe, baseline.name if baseline else "", tuple(_facts(baselines)),
+            tuple(found.data.items()), tuple(found.outcomes), tuple(found.timings),
+        )  # fmt: skip
+        history.append(night, found.findings, accuracy.ALPHA, found.measures)
+        write_all(Results(night, found.findings, accuracy.ALPHA, found.measures), request.history)
+        write_page(history, night.run_id, request.history / "report.html")
     return night
 
 
-def facts() -> list[tuple[str, str]]:
-    """Commit, versions, processor and BLAS kernel."""
+def machine() -> list[tuple[str, str]]:
+    """Versions, processor and BLAS kernel: where they differ, pictures may differ in a grey level."""
     made = provenance()
-    return [
-        ("commit", made.commit), ("python", made.python), *made.libraries, ("processor", made.processor),
-        ("blas", made.blas),
-    ]  # fmt: skip
+    return [("python", made.python), *made.libraries, ("processor", made.processor), ("blas", made.blas)]
 
 
-def _judge_all(desk: Desk, wanted: list[suites.Suite], baseline: Baseline | None, found: Found) -> None:
-    store = desk.request.history / "pictures"
-    pictures = {suite.name: suite.make(store / suite.name, desk.engine, desk.console) for suite in wanted}
-    digests = {name: suites.pictures_digest(dataset) for name, dataset in pictures.items()}
-    pinned = combined_digest("", digests.items())
-    found.data |= {suites.PINNED: pinned, **digests}
-    found.measures["pinned new"], replayed = _read_pinned(desk, pictures)
-    found.data |= {f"replay {name}": digest for name, digest in replayed.items()}
-    count = sum(dataset.read("frames", ["frame_id"]).num_rows for dataset in pictures.values())
-    found.outcomes.append(Outcome(RAN, State.PASSED, f"every stage ran on {count} pinned frames"))
-    if baseline is None:
-        told = "there is no baseline of this recipe yet; make this run the first with `nightly accept`"
-        found.outcomes.append(Outcome(BASELINE, State.FAILED, told, Exit.NO_VERDICT))
+def _facts(baselines: Baselines) -> list[tuple[str, str]]:
+    """Commit and machine, and waivers that judge no longer."""
+    ended = baselines.expired(datetime.date.today())
+    return [("commit", provenance().commit), *machine(), *([(ENDED_WAIVERS, "; ".join(ended))] if ended else [])]
+
+
+def _judge_all(desk: Desk, wanted: list[suites.Suite], found: Found) -> None:
+    pictures: dict[str, Dataset] = {}
+    replayed: dict[str, str] = {}
+    with found.at_gate(RAN):
+        store = desk.request.history / "pictures"
+        pictures |= {suite.name: suite.make(store / suite.name, desk.engine, desk.console) for suite in wanted}
+        digests = {name: suites.pictures_digest(dataset) for name, dataset in pictures.items()}
+        found.data |= {suites.PINNED: combined_digest("", digests.items()), **digests}
+        found.measures["pinned new"], of_poses = _read_pinned(desk, pictures)
+        replayed |= of_poses
+        found.data |= {f"replay {name}": digest for name, digest in replayed.items()}
+        count = sum(dataset.read("frames", ["frame_id"]).num_rows for dataset in pictures.values())
+        found.outcomes.append(Outcome(RAN, State.PASSED, f"every stage ran on {count} pinned frames"))
+    if found.stopped():
         return
-    _judge_data(desk, pictures, pinned, replayed, baseline, found)
-    if not found.stopped():
-        _judge_numbers(desk, pictures, baseline, found)
+    baseline = _baseline(desk, found)
+    if baseline is not None:
+        _judge_data(desk, pictures, replayed, baseline, found)
+        if not found.stopped():
+            _judge_numbers(desk, pictures, baseline, found)
+
+
+def _baseline(desk: Desk, found: Found) -> Baseline | None:
+    """The current baseline; without one, or without its code, that is the night's outcome."""
+    recipe = desk.request.recipe
+    if all(item.recipe != recipe for item in desk.baselines.baselines):
+        told = f"there is no baseline of recipe {recipe} yet; make this run the first with `nightly accept`"
+        found.outcomes.append(Outcome(BASELINE, State.FAILED, told, Exit.NO_VERDICT))
+        return None
+    with found.at_gate(BASELINE):
+        return desk.baselines.current(recipe)
 
 
 def _judge_data(
-    desk: Desk, pictures: dict[str, Dataset], pinned: str, replayed: dict[str, str], baseline: Baseline, found: Found
+    desk: Desk, pictures: dict[str, Dataset], replayed: dict[str, str], baseline: Baseline, found: Found
 ) -> None:
     """Whether tonight's numbers can be compared with the baseline's at all."""
-    found.outcomes.append(data.judge(pinned, baseline.pinned_data))
-    run = desk.history.run(baseline.run)
-    known = {item["name"]: item["value"] for item in run["data"]}
-    same = _machine({item["name"]: item["value"] for item in run["facts"]}) == _machine(dict(facts()))
-    again = [item for name, dataset in pictures.items() for item in regenerate.render_again(name, dataset)]
-    found.outcomes.append(regenerate.judge(again, same))
-    old = {name.removeprefix("replay "): value for name, value in known.items() if name.startswith("replay ")}
-    found.outcomes.append(replay.judge(old, replayed))
-
-
-def _machine(known: dict[str, str]) -> dict[str, str]:
-    return {name: value for name, value in known.items() if name != "commit"}
+    with found.at_gate(data.GATE):
+        found.outcomes.append(data.judge(found.data[suites.PINNED], baseline.pinned_data))
+    with found.at_gate(regenerate.GATE):
+        of_baseline = {item["name"]: item["value"] for item in desk.history.run(baseline.run)["facts"]}
+        same = all(of_baseline.get(name) == value for name, value in machine())
+        again = [item for name, dataset in pictures.items() for item in regenerate.render_again(name, dataset)]
+        found.outcomes.append(regenerate.judge(again, same))
+    with found.at_gate(replay.GATE):
+        known = {item["name"]: item["value"] for item in desk.history.run(baseline.run)["data"]}
+        old = {name.removeprefix("replay "): value for name, value in known.items() if name.startswith("replay ")}
+        found.outcomes.append(replay.judge(old, replayed))
 
 
 def _judge_numbers(desk: Desk, pictures: dict[str, Dataset], baseline: Baseline, found: Found) -> None:
-    old, new = desk.history.measures(baseline.measures[suites.PINNED]), found.measures["pinned new"]
-    found.measures["pinned old"] = old
-    pinned = judge(old, new, accuracy.ALPHA, paired=True)
-    found.findings[suites.PINNED] = pinned.findings
-    found.outcomes.append(accuracy.judge(pinned, lambda *what: desk.waived(accuracy.GATE, *what)))
-    code = code_of(baseline, desk.request.history)
-    tonight = _judge_fresh(desk, code, found) if fresh.GATE not in desk.request.without else None
-    found.outcomes.append(failures.judge(pinned, tonight, lambda *what: desk.waived(failures.GATE, *what)))
-    found.outcomes.append(tail.judge(old, new, lambda *what: desk.waived(tail.GATE, *what)))
+    pinned = tonight = None
+    with found.at_gate(accuracy.GATE):
+        old = desk.history.measures(baseline.measures[suites.PINNED])
+        found.measures["pinned old"] = old
+        pinned = judge(old, found.measures["pinned new"], accuracy.ALPHA, paired=True)
+        found.findings[suites.PINNED] = pinned.findings
+        found.outcomes.append(accuracy.judge(pinned, lambda *what: desk.waived(accuracy.GATE, *what)))
+    if pinned is None:
+        return
+    if fresh.GATE not in desk.request.without:
+        with found.at_gate(fresh.GATE):
+            tonight = _judge_fresh(desk, code_of(baseline, desk.request.history), found)
+    with found.at_gate(failures.GATE):
+        found.outcomes.append(failures.judge(pinned, tonight, lambda *what: desk.waived(failures.GATE, *what)))
+    with found.at_gate(tail.GATE):
+        old, new = (found.measures[f"pinned {side}"] for side in ("old", "new"))
+        found.outcomes.append(tail.judge(old, new, lambda *what: desk.waived(tail.GATE, *what)))
     if speed.GATE not in desk.request.without:
-        timings = _timings(desk, code, pictures)
-        found.outcomes.append(speed.judge(timings, lambda stage: desk.waived(speed.GATE, stage, None)))
+        with found.at_gate(speed.GATE):
+            found.timings += _timings(desk, code_of(baseline, desk.request.history), pictures)
+            found.outcomes.append(speed.judge(found.timings, lambda stage: desk.waived(speed.GATE, stage, None)))
 
 
 def _judge_fresh(desk: Desk, code: Code, found: Found) -> Judgement:
@@ -214,7 +221,7 @@ def _read_pinned(desk: Desk, pictures: dict[str, Dataset]) -> tuple[pa.Table, di
     return pa.concat_tables(tables), replayed
 
 
-def _timings(desk: Desk, code: Code, pictures: dict[str, Dataset]) -> list[speed.Timing]:
+def _timings(desk: Desk, code: Code, pictures: dict[str, Dataset]) -> list[Timing]:
     name, dataset = next(iter(pictures.items()))
     folders = tuple(suites.copy_pictures(dataset, desk.work / f"{name}-{side}") for side in ("time-old", "time-new"))
     frames = dataset.read_shard(dataset.shards("frames")[0], ["frame_id"]).num_rows

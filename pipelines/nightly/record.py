@@ -43,6 +43,18 @@ class Outcome:
 
 
 @dataclass(frozen=True, slots=True)
+class Timing:
+    """Processor time of one stage, the candidate's over the baseline's."""
+
+    stage: str
+    ratio: float  # median over the pairs of turns
+    low: float  # the smallest and the largest ratio of a pair
+    high: float
+    old_ms: float  # a frame
+    new_ms: float
+
+
+@dataclass(frozen=True, slots=True)
 class Night:
     """One run of `nightly`."""
 
@@ -50,9 +62,10 @@ class Night:
     started: datetime  # UTC
     recipe: str
     baseline: str
-    facts: tuple[tuple[str, str], ...]  # commit, versions, processor, BLAS kernel
-    data: tuple[tuple[str, str], ...]  # suite to content hash of its frames
+    facts: tuple[tuple[str, str], ...]  # commit, versions, processor, BLAS kernel, waivers that have ended
+    data: tuple[tuple[str, str], ...]  # what was read, and its content hash
     outcomes: tuple[Outcome, ...]
+    timings: tuple[Timing, ...] = ()  # of gate `speed`
 
     @property
     def exit(self) -> Exit:

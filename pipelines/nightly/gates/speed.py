@@ -12,14 +12,13 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
 import numpy as np
 
 from pipelines.nightly.other_code import CHOOSE_CODE, Code, OtherCodeError
-from pipelines.nightly.record import Exit, Outcome, State
+from pipelines.nightly.record import Exit, Outcome, State, Timing
 
 GATE = "speed"
 LARGEST_RATIO = 1.10
@@ -36,7 +35,10 @@ from datasets.store.dataset import open_dataset
 from pipelines.stages import detect, estimate
 from pipelines.stages.settings import Setting
 dataset = open_dataset(Path(sys.argv[3]))
-work = {"detect": lambda: detect.run_shard(dataset, 0, detector="edge-fit"), "estimate": lambda: estimate.run_shard(dataset, 0, Setting())}
+work = {
+    "detect": lambda: detect.run_shard(dataset, 0, detector="edge-fit"),
+    "estimate": lambda: estimate.run_shard(dataset, 0, Setting()),
+}
 for line in sys.stdin:
     spent = {}
     for name, stage in work.items():
@@ -46,18 +48,6 @@ for line in sys.stdin:
     print(json.dumps(spent), flush=True)
 """
 )
-
-
-@dataclass(frozen=True, slots=True)
-class Timing:
-    """Processor time of one stage, candidate over baseline."""
-
-    stage: str
-    ratio: float  # median over the pairs of turns
-    low: float  # the smallest and the largest ratio of a pair
-    high: float
-    old_ms: float  # a frame
-    new_ms: float
 
 
 def time_both(old: Code, new: Code, folders: tuple[Path, Path], frames: int, turns: int = TURNS) -> list[Timing]:

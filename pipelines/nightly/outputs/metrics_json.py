@@ -32,6 +32,7 @@ def text(results: Results) -> str:
         "facts": dict(night.facts),
         "data": dict(night.data),
         "gates": [_gate(outcome) for outcome in night.outcomes],
+        "speed": [asdict(item) for item in night.timings],
         "findings": [{name: _finite(value) for name, value in row.items()} for row in rows],
         "slices": [asdict(count) for count in results.counts()],
     }

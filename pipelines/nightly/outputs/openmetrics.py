@@ -29,7 +29,12 @@ Labels = Mapping[str, str]
 
 def text(results: Results) -> str:
     """All gauges, ended by `# EOF`."""
-    return "\n".join([*_night(results), *_gates(results), *_findings(results), *_counts(results), "# EOF"]) + "\n"
+    return (
+        "\n".join(
+            [*_night(results), *_gates(results), *_speed(results), *_findings(results), *_counts(results), "# EOF"]
+        )
+        + "\n"
+    )
 
 
 def _night(results: Results) -> Iterator[str]:
@@ -41,12 +46,22 @@ def _night(results: Results) -> Iterator[str]:
 
 
 def _gates(results: Results) -> Iterator[str]:
-    ended: dict[str, State] = {}
-    for outcome in results.night.outcomes:  # a gate may be told twice, as one that failed later on; that counts
-        if ended.get(outcome.gate) is not State.FAILED:
-            ended[outcome.gate] = outcome.state
-    held = [({"gate": gate, "state": state}, own is state) for gate, own in ended.items() for state in State]
+    held = [
+        ({"gate": own.gate, "state": state}, own.state is state) for own in results.night.outcomes for state in State
+    ]
     yield from _gauge("gate", "1 for the state in which a gate ended", held)
+
+
+def _speed(results: Results) -> Iterator[str]:
+    timings = results.night.timings
+    ratios = [({"stage": item.stage}, item.ratio) for item in timings]
+    yield from _gauge("stage_ratio", "processor time of a stage, candidate over baseline", ratios)
+    per_frame = [
+        ({"stage": item.stage, "side": side}, value / 1000.0)
+        for item in timings
+        for side, value in (("old", item.old_ms), ("new", item.new_ms))
+    ]
+    yield from _gauge("stage_seconds", "processor time of a stage, a frame", per_frame)
 
 
 def _findings(results: Results) -> Iterator[str]:

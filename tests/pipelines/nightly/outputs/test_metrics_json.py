@@ -8,6 +8,7 @@ import pytest
 
 from pipelines.nightly.history import FINDINGS
 from pipelines.nightly.outputs import metrics_json
+from pipelines.nightly.record import Timing
 from tests.pipelines.nightly import simulated
 from tests.pipelines.nightly.whole_nights import results
 
@@ -25,12 +26,17 @@ def test_the_schema_is_one_and_has_the_version():
     assert SCHEMA["$id"].endswith(f":{metrics_json.SCHEMA_VERSION}")
 
 
+TIMING = Timing("detect", 1.06, 1.05, 1.07, 17.0, 18.0)
+
+
 @pytest.mark.parametrize("options", [{}, {"fault": FAULT, "failing": (3,)}, {"failing": (3,), "waived": True}])
 def test_a_night_is_valid_and_has_no_key_beyond_the_schema(options):
-    held = json.loads(metrics_json.text(results(**options)))
+    found = results(**options)
+    timed = dataclasses.replace(found, night=dataclasses.replace(found.night, timings=(TIMING,)))
+    held = json.loads(metrics_json.text(timed))
     _validate(held)
     assert held.keys() == SCHEMA["properties"].keys() == set(SCHEMA["required"])
-    for name in ("gates", "findings", "slices"):
+    for name in ("gates", "speed", "findings", "slices"):
         item = SCHEMA["properties"][name]["items"]
         assert {frozenset(entry) for entry in held[name]} == {frozenset(item["properties"])}
         assert set(item["required"]) == item["properties"].keys()

@@ -7,7 +7,7 @@ from prometheus_client import parser as old_format
 from prometheus_client.openmetrics import parser as new_format
 
 from pipelines.nightly.outputs import openmetrics
-from pipelines.nightly.record import Outcome, State
+from pipelines.nightly.record import Timing
 from tests.pipelines.nightly import simulated
 from tests.pipelines.nightly.whole_nights import results
 
@@ -53,12 +53,12 @@ def test_the_numbers_are_the_nights():
     assert found[_key("frames", **failed)] == 20
 
 
-def test_a_gate_that_is_told_twice_has_one_sample_and_failed_counts():
+def test_processor_times_are_in_seconds():
     night = results()
-    told = [Outcome("ran", state, "told") for state in (State.PASSED, State.FAILED, State.PASSED)]
-    night = dataclasses.replace(night, night=dataclasses.replace(night.night, outcomes=tuple(told)))
-    assert _samples(night)[_key("gate", gate="ran", state="failed")] == 1
-    assert openmetrics.text(night).count('gate="ran",state="failed"') == 1
+    timed = dataclasses.replace(night.night, timings=(Timing("detect", 1.06, 1.05, 1.07, 17.0, 18.0),))
+    found = _samples(dataclasses.replace(night, night=timed))
+    assert found[_key("stage_ratio", stage="detect")] == 1.06
+    assert [found[_key("stage_seconds", stage="detect", side=side)] for side in ("old", "new")] == [0.017, 0.018]
 
 
 def test_facts_are_labels_of_the_run():

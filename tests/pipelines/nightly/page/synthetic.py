@@ -104,6 +104,7 @@ def _run(run_id, i, exit_code, baseline):
         "baseline": baseline,
         "exit": exit_code,
         "sentence": sentence,
+        "speed": [],
         "facts": [{"name": name, "value": value} for name, value in facts.items()],
         "data": [{"name": "pinned", "value": "77ae" * 16}, {"name": "fresh", "value": f"{i:064x}"}],
         "gates": [
