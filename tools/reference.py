@@ -7,13 +7,13 @@ import inspect
 from collections.abc import Iterable
 from typing import get_type_hints
 
+import click
 import pyarrow as pa
-import typer.main
 
 import eposit
 from datasets.recipe.model import describe, load_recipe, recipe_names
 from datasets.schema import dictionary
-from pipelines.cli import app
+from pipelines.cli import all_commands
 from pipelines.nightly.accepted import Baseline, Waiver
 from pipelines.nightly.history import FINDINGS, RUNS
 from pipelines.nightly.measures import SCHEMA as MEASURES
@@ -35,11 +35,10 @@ def table(titles: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
 
 def commands() -> str:
     """Every command with its arguments, options, defaults and an example."""
-    found = typer.main.get_command(app).commands  # pyright: ignore[reportAttributeAccessIssue]
-    return "\n".join(_command(name, command) for name, command in found.items())
+    return "\n".join(_command(name, command) for name, command in all_commands().items())
 
 
-def _command(name: str, command: object) -> str:
+def _command(name: str, command: click.Command) -> str:
     rows = []
     for parameter in command.params:  # pyright: ignore[reportAttributeAccessIssue]
         if parameter.param_type_name == "argument":

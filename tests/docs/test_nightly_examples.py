@@ -10,11 +10,9 @@ from pathlib import Path
 
 import pytest
 import yaml
-from typer.main import get_command
 
-from pipelines.cli import app
 from pipelines.nightly.outputs import write_all
-from tests.docs.documents import ROOT
+from tests.docs.documents import COMMANDS, ROOT, named
 from tests.pipelines.nightly.whole_nights import results
 
 EXAMPLES = ROOT / "examples" / "nightly"
@@ -72,9 +70,8 @@ def _load(name):
 
 
 def test_the_command_exists_with_its_options():
-    words, command = _night(), get_command(app)
-    while hasattr(command, "commands"):
-        command = command.commands[words.pop(0)]  # pyright: ignore
+    words = _night()
+    command = COMMANDS[named(words)]
     known = {option for parameter in command.params for option in (*parameter.opts, *parameter.secondary_opts)}
     assert {word for word in words if word.startswith("-")} <= known
     assert words[words.index("--history") + 1] == NIGHTS
