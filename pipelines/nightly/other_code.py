@@ -7,10 +7,11 @@ the wanted folder first itself, and refuses to go on if another `eposit` answers
 from __future__ import annotations
 
 import hashlib
+import json
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -33,12 +34,15 @@ for name in packages:
     if not found.is_relative_to(folder):
         sys.exit(f"{name} is {found}, not in {folder}")
 """
-RUN_COMMAND = (
+RUN_COMMANDS = (
     CHOOSE_CODE
     + """
+import json
 from pipelines.__main__ import main
-sys.argv = ["pipelines", *sys.argv[3:]]
-sys.exit(main())
+for words in json.loads(sys.argv[3]):
+    sys.argv = ["pipelines", *words]
+    if code := main():
+        sys.exit(code)
 """
 )
 
@@ -54,18 +58,23 @@ class Code:
     folder: Path
     packages: tuple[str, ...] = PACKAGES
 
-    def run(self, *words: str | Path, functions: Path | None = None) -> None:
+    def run(self, *words: str | Path) -> None:
         """Run `python -m pipelines WORDS` with this code.
-
-        functions: working directory, from which a user's own functions are imported.
 
         Raises:
             OtherCodeError: it failed, or another `eposit` answered.
         """
-        command = [sys.executable, "-c", RUN_COMMAND, self.folder, ",".join(self.packages), *words]
+        self.run_all([words])
+
+    def run_all(self, commands: Sequence[Sequence[str | Path]]) -> None:
+        """Run several commands one after the other in one process, since starting one takes a second.
+
+        Raises:
+            OtherCodeError: one failed, or another `eposit` answered.
+        """
+        words = json.dumps([[str(word) for word in command] for command in commands])
         done = subprocess.run(
-            list(map(str, command)),
-            cwd=functions,
+            [sys.executable, "-c", RUN_COMMANDS, str(self.folder), ",".join(self.packages), words],
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
@@ -73,7 +82,8 @@ class Code:
         )
         if done.returncode:
             said = " ".join((done.stderr or done.stdout).strip().splitlines()[-LAST_LINES:])
-            raise OtherCodeError(f"code in {self.folder}, command {words[0]}: {said or f'exit {done.returncode}'}")
+            names = ", ".join(dict.fromkeys(str(command[0]) for command in commands))
+            raise OtherCodeError(f"code in {self.folder}, {names}: {said or f'exit {done.returncode}'}")
 
 
 def digest_of(folder: Path = ROOT) -> str:

@@ -108,10 +108,8 @@ def read_by(code: Code, pictures: Dataset, folder: Path, settings: Sequence[Sett
     """
     copy_pictures(pictures, folder)
     common = ("--workers", str(workers), "--quiet")
-    code.run("detect", folder, *common)
-    for setting in settings:
-        code.run("estimate", folder, *_options(setting), *common)
-    code.run("score", folder, *common)
+    estimates = [("estimate", folder, *_options(setting), *common) for setting in settings]
+    code.run_all([("detect", folder, *common), *estimates, ("score", folder, *common)])
     return _reading(open_dataset(folder))
 
 
