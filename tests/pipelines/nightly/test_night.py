@@ -99,7 +99,7 @@ def test_the_same_code_is_fine_in_every_gate(night, nights):
 
 
 def test_corners_that_are_off_by_two_thousandths_of_a_pixel_are_worse(night, monkeypatch, nights, cli):
-    """Exit code 1, in the slice where it is, on pinned and on two looks at fresh pictures; `explain` shows the frames."""
+    """Exit code 1, on pinned pictures and on two looks at fresh ones; `explain` names frames."""
     _plant(monkeypatch, 0.002)
     _, row = night(*RUN, "--without", "speed")
     assert row["exit"] == 1

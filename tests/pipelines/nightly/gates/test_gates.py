@@ -201,3 +201,9 @@ def test_speed(ratio, state):
         assert found.sentence.startswith("estimate takes 1.11 times")
         assert speed.judge(timings, lambda stage: stage == "estimate").state is State.WAIVED
         assert speed.judge(timings, lambda stage: stage == "detect").state is State.FAILED
+
+
+def test_speed_is_waived_only_if_every_slow_stage_is():
+    slow = [Timing(stage, 1.2, 1.1, 1.3, 1.0, 1.2) for stage in ("detect", "estimate")]
+    assert speed.judge(slow, lambda stage: stage == "detect").state is State.FAILED
+    assert speed.judge(slow, everybody).state is State.WAIVED
