@@ -41,6 +41,7 @@ NIGHTLY_COMMANDS: tuple[tuple[Callable[..., None], str], ...] = (
     (nightly.run, "nightly run nightly --history out/nights"),
     (nightly.accept, "nightly accept RUN --history out/nights --reason 'the new detector'"),
     (nightly.explain, "nightly explain typical/equisolid/edge-fit --history out/nights"),
+    (nightly.frame, "nightly frame pinned-typical 0 --history out/nights --out out/frame.png"),
     (nightly.report, "nightly report --history out/nights"),
 )
 NIGHTLY_HELP = "Accuracy every night: compared with a frozen baseline, kept, shown, and judged by the exit code."

@@ -32,6 +32,9 @@ Judged = Annotated[
 RunName = Annotated[str, typer.Argument(metavar="RUN", help="Run of the history, or `latest`.")]
 SliceName = Annotated[str, typer.Argument(metavar="SLICE", help="As regime/camera/system.")]
 OfRun = Annotated[str, typer.Option("--run", help="Run of the history.")]
+SuiteName = Annotated[str, typer.Argument(metavar="SUITE", help="As the page names it, for example pinned-typical.")]
+FrameNumber = Annotated[int, typer.Argument(metavar="FRAME", help="Its frame_id in the suite.")]
+Png = Annotated[Path, typer.Option("--out", help="File of the picture.")]
 Reason = Annotated[str, typer.Option(help="Why; it stays in baselines.toml.")]
 Until = Annotated[str | None, typer.Option(metavar="DATE", help="Last day of a waiver, as 2026-05-04.")]
 By = Annotated[str | None, typer.Option(help="Who accepts.  [default: the user's name]")]
@@ -115,6 +118,22 @@ def explain(slice: SliceName, history: HistoryFolder, run: OfRun = "latest", jso
     print_table((*columns, Column("verdict")), found.rows())
     for line in found.lines():
         typer.echo(line)
+
+
+def frame(
+    suite: SuiteName, frame_id: FrameNumber, history: HistoryFolder, run: OfRun = "latest", out: Png = Path("frame.png")
+) -> None:
+    """Make one picture of a run again, into a PNG, and tell what this code finds in it."""
+    from datasets.store.images import encode_png
+    from datasets.store.refusals import refused
+    from pipelines.nightly.one_frame import remake
+
+    found = remake(history, run, suite, frame_id)
+    try:
+        out.write_bytes(encode_png(found.image))
+    except OSError as error:
+        raise refused(out, error) from error
+    typer.echo(f"{out}: frame {frame_id} of {suite}, camera {found.camera}\n{found.told}")
 
 
 def report(history: HistoryFolder, run: OfRun = "latest") -> None:

@@ -95,11 +95,11 @@ def _moved(history: History, run_id: str, slice: str, findings: tuple[dict[str, 
         before, after = (next((item for item in slices(table) if item.name == slice), None) for table in tables)
         if before is not None and after is not None:
             margins = {item["metric"]: item["margin"] for item in findings if item["suite"] == suite}
-            moved += _steps(suite, before, after, margins)
+            moved += steps(suite, before, after, margins)
     return sorted(moved, key=lambda item: -item.margins)[:MOST_FRAMES]
 
 
-def _steps(suite: str, before: Slice, after: Slice, margins: dict[str, float]) -> Iterator[Moved]:
+def steps(suite: str, before: Slice, after: Slice, margins: dict[str, float]) -> Iterator[Moved]:
     """Every metric of every frame that both sides have and that differs."""
     frames, of_old, of_new = np.intersect1d(before.frame_id, after.frame_id, return_indices=True)
     for name, margin in margins.items():

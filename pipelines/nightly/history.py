@@ -49,8 +49,8 @@ RUNS = pa.schema(
         _field(
             "data",
             _PAIRS,
-            "what was read, and its content hash: `pinned` and each suite with its regime, the pictures; `replay` with "
-            "a suite and a setting, poses from unchanged points; `code`, the candidate's source files",
+            "what was read, with its hash: `pinned` and each suite with its regime, the pictures; `replay` with "
+            "a suite and a setting, poses of unchanged points; `code`, its files; `fresh seed`, that seed itself",
         ),
         _field(
             "gates",

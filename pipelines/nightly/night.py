@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import datetime
-import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
+import traceback
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,10 +11,8 @@ import pyarrow as pa
 from rich.console import Console
 
 from datasets.errors import UserError
-from datasets.store.atomic import own_name
 from datasets.store.dataset import Dataset
 from datasets.store.digest import combined_digest
-from datasets.store.lock import HeldError, hold
 from pipelines.engines.local import LocalEngine
 from pipelines.machine import provenance
 from pipelines.nightly import suites
@@ -29,11 +25,13 @@ from pipelines.nightly.judgement import Judgement, judge
 from pipelines.nightly.other_code import ROOT, Code, freeze
 from pipelines.nightly.outputs import write_all
 from pipelines.nightly.outputs.results import Results
+from pipelines.nightly.page.pictures import Picture
 from pipelines.nightly.page.write import write_page
 from pipelines.nightly.record import Exit, Night, Outcome, State, Timing
+from pipelines.nightly.work_folder import work_folder
+from pipelines.nightly.worst_frames import pictures_of_all, worst
 from pipelines.stages.settings import Setting
 
-WORK_PREFIX = ".work-"
 ENDED_WAIVERS = "ended waivers"  # name of a fact
 ORDER = ("data", "regenerate", "replay", "accuracy", "fresh", "failures", "tail", "speed")
 
@@ -84,9 +82,10 @@ def run_night(request: Request, console: Console) -> Night:
     baselines, history = load(request.history / FILE_NAME), History(request.history)
     history.check()
     baseline = next((item for item in reversed(baselines.baselines) if item.recipe == request.recipe), None)
-    found = Found(data={"code": freeze(request.history / "code").name})
-    with _work_folder(request.history) as work:
-        _judge_all(Desk(request, history, work, baselines, LocalEngine(request.workers), console), wanted, found)
+    found = Found(data={"code": freeze(request.history / "code").name, suites.SEED: str(request.seed)})
+    with work_folder(request.history) as work:
+        desk = Desk(request, history, work, baselines, LocalEngine(request.workers), console)
+        _judge_all(desk, wanted, found)
         left = [gate for gate in ORDER if gate not in {item.gate for item in found.outcomes}]
         found.outcomes += [Outcome(gate, State.NOT_RUN, "nothing to judge") for gate in left]
         night = Night(
@@ -95,7 +94,8 @@ def run_night(request: Request, console: Console) -> Night:
         )  # fmt: skip
         history.append(night, found.findings, accuracy.ALPHA, found.measures)
         write_all(Results(night, found.findings, accuracy.ALPHA, found.measures), request.history)
-        write_page(history, night.run_id, request.history / "report.html")
+        shown = _pictures(desk, night, baseline, found) if baseline and night.exit else []
+        write_page(history, night.run_id, request.history / "report.html", shown)
     return night
 
 
@@ -221,6 +221,17 @@ def _read_pinned(desk: Desk, pictures: dict[str, Dataset]) -> tuple[pa.Table, di
     return pa.concat_tables(tables), replayed
 
 
+def _pictures(desk: Desk, night: Night, baseline: Baseline, found: Found) -> list[Picture]:
+    """The worst frames of a night that is not fine; none, and the reason on stderr, if they cannot be shown."""
+    root, workers = desk.request.history, desk.request.workers
+    try:
+        noticed = worst(found.measures, found.findings)
+        return pictures_of_all(noticed, night.run_id, root, desk.work, code_of(baseline, root), workers)
+    except Exception:  # the verdict is worth more than its pictures
+        traceback.print_exc()
+        return []
+
+
 def _timings(desk: Desk, code: Code, pictures: dict[str, Dataset]) -> list[Timing]:
     name, dataset = next(iter(pictures.items()))
     folders = tuple(suites.copy_pictures(dataset, desk.work / f"{name}-{side}") for side in ("time-old", "time-new"))
@@ -241,24 +252,3 @@ def code_of(baseline: Baseline, history: Path) -> Code:
         wanted = f"pip install --no-deps --target {folder} eposit=={baseline.version}"
         raise UserError(f"baseline {baseline.name} is version {baseline.version} of eposit, not in {folder}; {wanted}")
     return Code(folder, ("eposit",))
-
-
-@contextmanager
-def _work_folder(history: Path) -> Iterator[Path]:
-    """A folder of this night alone; those that killed nights of this machine left are removed."""
-    for folder in history.glob(f"{WORK_PREFIX}*"):
-        try:
-            with hold(folder):
-                shutil.rmtree(folder, ignore_errors=True)
-        except (HeldError, OSError):
-            pass
-    work = history / own_name(WORK_PREFIX)
-    try:
-        work.mkdir(parents=True)
-    except OSError as error:
-        raise UserError(f"cannot write {work}: {error.strerror}; choose another --history") from error
-    with hold(work):
-        try:
-            yield work
-        finally:
-            shutil.rmtree(work, ignore_errors=True)

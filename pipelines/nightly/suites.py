@@ -6,7 +6,7 @@ of its own that shares the pictures and their truth with the suite.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,6 +29,7 @@ from pipelines.stages.settings import RUN_SETTINGS, Setting
 PINNED, FRESH, CONFIRMING = "pinned", "fresh", "confirming"
 FRESH_POSES = 20  # enough for every metric but the circle's, which the pinned pictures judge
 CONFIRMING_SEED = 1_000_000_000  # added to a night's seed
+SEED = "fresh seed"  # a night's seed among its data
 EXACT = Setting(points="truth")
 NOISY = Setting(points="truth+noise", draws=1)
 READ = (RUN_SETTINGS[0], Setting(use="four"), EXACT, NOISY)  # what a night estimates
@@ -74,6 +75,12 @@ def suites(kind: str, recipe: str, regimes: Sequence[str], seed: int | None = No
         own = with_regime(text, regime, recipe)
         found.append(Suite(kind, regime, parse_recipe(own, f"recipe {recipe} with regime {regime}"), own))
     return found
+
+
+def seed_of(kind: str, data: Mapping[str, str]) -> int | None:
+    """The seed of a kind's pictures in a night with such data; None is the recipe's own."""
+    added = {PINNED: None, FRESH: 0, CONFIRMING: CONFIRMING_SEED}[kind]
+    return None if added is None else int(data[SEED]) + added
 
 
 def _fewer_poses(recipe: Recipe) -> dict[tuple[str, ...], int]:

@@ -18,7 +18,7 @@ from tests.pipelines.nightly.whole_nights import results
 LINES = sorted(set(commands()))
 # What needs a dataset at most, and seconds at most; the others render, measure or reproduce the paper.
 QUICK = {"describe", "detect", "doctor", "estimate", "recipes", "report", "score", "verify"}
-# What needs a history of nights; `nightly run` makes one, and renders.
+# What needs a history of nights; `nightly run` and `nightly frame` render.
 OF_HISTORY = {"nightly accept", "nightly explain", "nightly report"}
 
 

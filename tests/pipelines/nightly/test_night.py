@@ -8,6 +8,8 @@ import dataclasses
 import datetime
 import json
 import os
+import re
+import shlex
 import shutil
 import signal
 import subprocess
@@ -19,6 +21,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from datasets.store.dataset import open_dataset
+from datasets.store.images import decode_png
 from pipelines.nightly import baselines
 from pipelines.nightly.acceptance import accept_baseline
 from pipelines.nightly.accepted import Waiver
@@ -110,9 +113,31 @@ def test_corners_that_are_off_by_two_thousandths_of_a_pixel_are_worse(night, mon
     assert {item["suite"] for item in found} == {"pinned", "fresh", "confirming"}
     assert {item["verdict"] for item in found} == {"worse"}
     assert all(item["effect"] == pytest.approx(0.002, abs=1e-9) for item in found)  # rounding of sums of pixels
+    _shows_the_worst_frames(nights, row, cli)
     explained = cli("nightly", "explain", SLICE, "--history", nights, "--json")
     assert explained.code == 0
     assert len({item["frame_id"] for item in json.loads(explained.out)["moved"]}) > 1
+
+
+def _shows_the_worst_frames(nights, row, cli):
+    """All twelve of both suites, with both sides' corners; the command beside one makes the same picture."""
+    page = (nights / "report.html").read_text()
+    commands = re.findall(r"Make it again: <code>python -m pipelines (.+?)</code>", page)
+    assert len(commands) == 12
+    assert page.count("<b>baseline</b> 55 of 55 points") == page.count("<b>candidate</b> 55 of 55 points") == 12
+    for suite in ("pinned", "fresh"):
+        words = shlex.split(next(line for line in commands if f" {suite}-typical " in line))
+        out = nights / "frame.png"
+        done = cli(*words[:-1], out)
+        assert done.code == 0
+        assert "54 of 54 corners, mean error " in done.out
+    pictures = open_dataset(nights / "pictures" / "pinned-typical")
+    (stored,) = [item for item in pictures.read("frames").to_pylist() if item["frame_id"] == 2]
+    assert cli("nightly", "frame", "pinned-typical", 2, "--history", nights, "--out", out).code == 0
+    np.testing.assert_array_equal(decode_png(out.read_bytes()), decode_png(stored["image"]["bytes"]))
+    for words, told in ((("fresh-typcal", 0), "did you mean"), (("fresh-typical", 6), "from 0 to 5")):
+        done = cli("nightly", "frame", *words, "--history", nights, "--out", out)
+        assert (done.code, told in done.err) == (2, True)
 
 
 def test_a_waiver_counts_until_its_day_has_passed(night, monkeypatch, nights):
