@@ -6,7 +6,7 @@ SETUP := $(VENV)/.done
 BLENDER := .venv-blender
 BLENDER_PYTHON ?= $(PYTHON)
 
-.PHONY: help setup demo test test-full check-slow test-oldest test-newest lint types layers layers-picture docs bench \
+.PHONY: help setup demo nightly test test-full check-slow test-oldest test-newest lint types layers layers-picture docs bench \
 	bench-blender wheel lock clean
 
 help:  ## this list
@@ -24,11 +24,21 @@ $(SETUP): requirements.txt pyproject.toml
 demo: $(SETUP)  ## 40 rendered frames, poses and out/demo/report.html
 	$(BIN)/python -m pipelines demo --out out/demo
 
+NIGHTLY := $(BIN)/python -m pipelines nightly
+NIGHTS := out/nights-smoke
+
+# The first night has no baseline yet, so that it ends with 3; accepted, it is the baseline of the second and of later
+# calls. The night's exit code is in the last lines; make's own is 2 for any code but 0.
+nightly: $(SETUP)  ## two small nights, the first accepted as the second's baseline, then the path of their page
+	@test -f $(NIGHTS)/baselines.toml || { $(NIGHTLY) run nightly-smoke --history $(NIGHTS) --quiet; test $$? -eq 3; }
+	@test -f $(NIGHTS)/baselines.toml || $(NIGHTLY) accept latest --history $(NIGHTS) --reason "the first night"
+	@$(NIGHTLY) run nightly-smoke --history $(NIGHTS) --quiet; code=$$?; echo $(NIGHTS)/report.html; exit $$code
+
 test: $(SETUP)  ## the tests that need pip only, under 6 minutes on 2 cores
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not full and not slow"
 
-test-full: $(SETUP)  ## adds a Ray cluster, and other environments: the built wheel, readers of a dataset
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check "ray>=2.9"
+test-full: $(SETUP)  ## adds a Ray cluster, and other environments: the built wheel, readers of a dataset, a browser
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check "ray>=2.9" playwright
 	$(BIN)/python -m pytest -m full
 
 check-slow: $(SETUP)  ## kills at random moments, two commands at once

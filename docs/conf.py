@@ -36,6 +36,8 @@ MADE = {
     "sensor regimes": reference.sensor_regimes,
     "tables": reference.tables,
     "library": reference.library,
+    "history": reference.history,
+    "baselines": reference.baselines,
 }
 
 

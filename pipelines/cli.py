@@ -7,12 +7,15 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
+import click
 import typer
+import typer.main
 
 from datasets.errors import UserError
-from pipelines.commands import stages, tools
+from pipelines.commands import compare, nightly, stages, tools
 
 USER_ERROR, INTERRUPTED = 2, 130
+EXAMPLE = "Example: python -m pipelines {}"
 ABOUT = "Rendered images of a chessboard through exact fish-eye cameras, detected, solved and scored against truth."
 
 # Each command with its example, in the order of `--help`.
@@ -24,6 +27,7 @@ COMMANDS: tuple[tuple[Callable[..., None], str], ...] = (
     (stages.score, "score out/demo --poses poses.csv --name theirs"),
     (stages.report, "report out/demo"),
     (stages.demo, "demo --out out/demo"),
+    (compare.compare, "compare out/before out/after"),
     (tools.verify, "verify out/demo"),
     (tools.doctor, "doctor"),
     (tools.bench, "bench demo --only render --only solver --out bench.md"),
@@ -31,6 +35,15 @@ COMMANDS: tuple[tuple[Callable[..., None], str], ...] = (
     (tools.recipes, "recipes"),
     (tools.describe, "describe demo"),
 )
+
+# `nightly` is a command with commands of its own.
+NIGHTLY_COMMANDS: tuple[tuple[Callable[..., None], str], ...] = (
+    (nightly.run, "nightly run nightly --history out/nights"),
+    (nightly.accept, "nightly accept RUN --history out/nights --reason 'the new detector'"),
+    (nightly.explain, "nightly explain typical/equisolid/edge-fit --history out/nights"),
+    (nightly.report, "nightly report --history out/nights"),
+)
+NIGHTLY_HELP = "Accuracy every night: compared with a frozen baseline, kept, shown, and judged by the exit code."
 
 
 def command_line() -> typer.Typer:
@@ -44,9 +57,25 @@ def command_line() -> typer.Typer:
         pretty_exceptions_enable=False,
         rich_markup_mode=None,
     )
-    for command, example in COMMANDS:
-        app.command(epilog=f"Example: python -m pipelines {example}")(command)
+    _add(app, COMMANDS)
+    nights = typer.Typer(help=NIGHTLY_HELP, no_args_is_help=True, rich_markup_mode=None)
+    _add(nights, NIGHTLY_COMMANDS)
+    app.add_typer(nights, name="nightly", epilog=EXAMPLE.format(NIGHTLY_COMMANDS[0][1]))
     return app
+
+
+def _add(app: typer.Typer, commands: tuple[tuple[Callable[..., None], str], ...]) -> None:
+    for command, example in commands:
+        app.command(epilog=EXAMPLE.format(example))(command)
+
+
+def all_commands() -> dict[str, click.Command]:
+    """Every command by its name; those of a group by both names."""
+    found: dict[str, click.Command] = {}
+    for name, command in typer.main.get_command(app).commands.items():  # pyright: ignore[reportAttributeAccessIssue]
+        own = getattr(command, "commands", {})
+        found |= {f"{name} {inner}": item for inner, item in own.items()} or {name: command}
+    return found
 
 
 app = command_line()

@@ -9,12 +9,11 @@ from pathlib import Path
 
 import pytest
 import yaml
-from typer.main import get_command
 
-from pipelines.cli import app
+from pipelines.cli import all_commands
 
 ROOT = Path(__file__).resolve().parents[1]
-COMMANDS = get_command(app).commands  # pyright: ignore
+COMMANDS = all_commands()
 
 
 def test_datasets_and_render_are_ours():

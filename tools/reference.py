@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+import dataclasses
 import inspect
 from collections.abc import Iterable
+from typing import get_type_hints
 
-import typer.main
+import click
+import pyarrow as pa
 
 import eposit
 from datasets.recipe.model import describe, load_recipe, recipe_names
 from datasets.schema import dictionary
-from pipelines.cli import app
+from pipelines.cli import all_commands
+from pipelines.nightly.accepted import Baseline, Waiver
+from pipelines.nightly.history import FINDINGS, RUNS
+from pipelines.nightly.measures import SCHEMA as MEASURES
 from render.sensor.presets import regime_rows, regimes
 
 LIBRARY = ("solve", "Camera", "Solution", "Status", "Pose", "Lens", "get_lens")
+
+HISTORY = {"runs": RUNS, "findings": FINDINGS, "measures": MEASURES}
+ACCEPTED = {"baseline": Baseline, "waiver": Waiver}
 
 
 def table(titles: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
@@ -26,11 +35,10 @@ def table(titles: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
 
 def commands() -> str:
     """Every command with its arguments, options, defaults and an example."""
-    found = typer.main.get_command(app).commands  # pyright: ignore[reportAttributeAccessIssue]
-    return "\n".join(_command(name, command) for name, command in found.items())
+    return "\n".join(_command(name, command) for name, command in all_commands().items())
 
 
-def _command(name: str, command: object) -> str:
+def _command(name: str, command: click.Command) -> str:
     rows = []
     for parameter in command.params:  # pyright: ignore[reportAttributeAccessIssue]
         if parameter.param_type_name == "argument":
@@ -77,6 +85,34 @@ def sensor_regimes() -> str:
 def tables() -> str:
     """Every table of a dataset with its columns."""
     return dictionary().replace("### ", "## ")
+
+
+def history() -> str:
+    """Every table of the history of the nights with its columns."""
+    return "\n".join(f"### {name}\n\n{_columns(schema)}" for name, schema in HISTORY.items())
+
+
+def _columns(schema: pa.Schema) -> str:
+    rows = []
+    for field in schema:
+        known = {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
+        unit = f", {known['unit']}" if known.get("unit", "1") != "1" else ""
+        rows.append((f"`{field.name}`", f"`{field.type}`", known["meaning"] + unit))
+    return table(("column", "type", "meaning"), rows)
+
+
+def baselines() -> str:
+    """Every key of the file of baselines, with its meaning."""
+    return "\n".join(f"### `[[{name}]]`\n\n{_entry_keys(kind)}" for name, kind in ACCEPTED.items())
+
+
+def _entry_keys(kind: type) -> str:
+    hints = get_type_hints(kind, include_extras=True)
+    rows = []
+    for field in dataclasses.fields(kind):
+        needed = "required" if field.default is dataclasses.MISSING else ""
+        rows.append((f"`{field.name}`", needed, _literal(hints[field.name].__metadata__[0])))
+    return table(("key", "", "meaning"), rows)
 
 
 def library() -> str:

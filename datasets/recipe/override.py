@@ -1,10 +1,11 @@
-"""A recipe's text with another sensor regime, as if it had been written in the file."""
+"""A recipe's text with other values, as if they had been written in the file."""
 
 from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import MutableMapping
+from collections.abc import Mapping, MutableMapping
+from typing import Any
 
 import tomlkit
 from tomlkit import TOMLDocument
@@ -27,6 +28,33 @@ def with_regime(text: str, regime: str, source: str) -> str:
     if changed is None:
         raise UserError(f"cannot put --regime into {source}; write regime = {json.dumps(regime)} under [sensor] there")
     return changed
+
+
+def with_values(text: str, values: Mapping[tuple[str, ...], int], source: str) -> str:
+    """The TOML text with other values of some keys, each given as its path; comments stay.
+
+    Raises:
+        UserError: the text is written so that a value cannot be put into it.
+    """
+    wanted = tomllib.loads(text)
+    for path, value in values.items():
+        _table(wanted, path)[path[-1]] = value
+    changed = changed_text(text, lambda document: _put_values(document, values), wanted)
+    if changed is None:
+        raise UserError(f"cannot put {', '.join('.'.join(path) for path in values)} into {source}; write them there")
+    return changed
+
+
+def _put_values(document: TOMLDocument, values: Mapping[tuple[str, ...], int]) -> str:
+    for path, value in values.items():
+        _table(document, path)[path[-1]] = value
+    return document.as_string()
+
+
+def _table(document: MutableMapping[str, Any], path: tuple[str, ...]) -> MutableMapping[str, Any]:
+    for name in path[:-1]:
+        document = document.setdefault(name, {})
+    return document
 
 
 def _put_regime(document: TOMLDocument, regime: str) -> str:

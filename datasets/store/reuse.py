@@ -1,4 +1,4 @@
-"""Linear light from another dataset of the same views: what was rendered once need not be rendered again."""
+"""Pictures and linear light from another dataset: what was rendered once need not be rendered again."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from datasets.plan import shard_count, shard_frames
 from datasets.store.atomic import replace_atomically
 from datasets.store.dataset import Dataset, open_dataset
 from datasets.store.linear_images import LinearImageError, are_kept, masters, read_linear, require_kept
-from datasets.store.refusals import refused
+from datasets.store.refusals import missing, refused
 
 
 def reuse_linear_images(dataset: Dataset, source: Path) -> tuple[int, int]:
@@ -37,6 +37,24 @@ def reuse_linear_images(dataset: Dataset, source: Path) -> tuple[int, int]:
         except OSError as error:
             raise refused(path, error) from error
     return len(taken), len(lacking)
+
+
+def share_pictures(dataset: Dataset, source: Dataset) -> None:
+    """Link or copy into a dataset the pictures and their truth of another of the same recipe; what is there stays.
+
+    Raises:
+        UserError: `source` lacks some, or the disk or its permissions refuse.
+    """
+    count = shard_count(dataset.recipe)
+    for path in (source.shard_path(table, i, count) for table in ("frames", "keypoints") for i in range(count)):
+        if not source.is_done(path):
+            raise missing(path)
+        place = dataset.root / path.relative_to(source.root)
+        if not dataset.is_done(place):
+            try:
+                _link_or_copy(path, place)
+            except OSError as error:
+                raise refused(place, error) from error
 
 
 def source_of(folder: Path) -> Dataset:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 
 from datasets.errors import UserError
 from datasets.plan import Frame, frames_of_shard, shard_count
@@ -17,6 +18,7 @@ from datasets.store.dataset import Dataset
 from datasets.store.images import encode_png
 from datasets.store.linear_images import LinearImageError, are_kept, linear_key, linear_path, read_linear, write_linear
 from datasets.store.refusals import refused
+from eposit.arrays import Array
 from eposit.pose import tilt_rad
 from pipelines.engines.background import overlapped
 from render.frame import LinearImage, render_frame
@@ -53,21 +55,33 @@ def run_shard(dataset: Dataset, index: int, advance: Callable[[], None] = lambda
 
 def _light(dataset: Dataset, frame: Frame) -> tuple[LinearImage, bool]:
     """The frame's linear light, and whether it is new: read if it is there and made from the same things."""
-    recipe = dataset.recipe
     try:
-        return read_linear(dataset.root / linear_path(frame), linear_key(recipe, frame)), False
+        return read_linear(dataset.root / linear_path(frame), linear_key(dataset.recipe, frame)), False
     except LinearImageError:
-        pass
+        return _rendered(dataset.recipe, frame), True
+
+
+def _rendered(recipe: Recipe, frame: Frame) -> LinearImage:
+    camera, samples = frame.camera.true_camera(), recipe.sample_count()
     try:
-        return render_frame(
-            recipe.target,
-            recipe.light,
-            frame.camera.true_camera(),
-            frame.cam_from_obj,
-            samples=recipe.sample_count(),
-        ), True
+        return render_frame(recipe.target, recipe.light, camera, frame.cam_from_obj, samples=samples)
     except ValueError as error:
         raise UserError(f"frame {frame.frame_id}: {error}") from error
+
+
+def _developed(recipe: Recipe, frame: Frame, linear: LinearImage) -> NDArray[np.uint8]:
+    camera = frame.camera.true_camera()
+    context = FrameContext(recipe.target, camera, frame.cam_from_obj, frame.rate, linear.region, frame.sensor_seed)
+    return develop(linear.full(camera), frame.sensor, context)
+
+
+def picture(recipe: Recipe, frame: Frame) -> NDArray[np.uint8]:
+    """(height, width) grey values of a frame, rendered anew.
+
+    Raises:
+        UserError: it cannot be rendered.
+    """
+    return _developed(recipe, frame, _rendered(recipe, frame))
 
 
 def _finish(dataset: Dataset, frame: Frame, linear: LinearImage, is_new: bool) -> dict[str, object]:
@@ -79,8 +93,7 @@ def _finish(dataset: Dataset, frame: Frame, linear: LinearImage, is_new: bool) -
             write_linear(linear, camera, dataset.root / relative, linear_key(recipe, frame))
         except OSError as error:
             raise refused(dataset.root / relative, error) from error
-    context = FrameContext(recipe.target, camera, frame.cam_from_obj, frame.rate, linear.region, frame.sensor_seed)
-    image = develop(linear.full(camera), frame.sensor, context)
+    image = _developed(recipe, frame, linear)
     coefficients = np.zeros(4)
     coefficients[: len(spec.coefficients)] = spec.coefficients
     region = dict(zip((f"region_{a}_px" for a in Region._fields), linear.region, strict=True))
@@ -108,11 +121,15 @@ def _finish(dataset: Dataset, frame: Frame, linear: LinearImage, is_new: bool) -
     }
 
 
+def true_points(recipe: Recipe, frame: Frame) -> Array:
+    """(n, 2) px images of the target's points, NaN beyond the lens."""
+    return frame.camera.true_camera().project(frame.cam_from_obj.apply(recipe.target.points))
+
+
 def _keypoints(recipe: Recipe, frame: Frame) -> pa.Table:
     target, camera = recipe.target, frame.camera.true_camera()
-    points = target.points
+    points, pixels = target.points, true_points(recipe, frame)
     in_cam = frame.cam_from_obj.apply(points)
-    pixels = camera.project(in_cam)
     outline = pixels.copy()
     outline[target.circle_index] = outline_centroid(camera.project(frame.cam_from_obj.apply(target.circle_rim())))
     return table(

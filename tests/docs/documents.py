@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from pipelines.cli import all_commands
+
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENTS = sorted(
     [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")] + list((ROOT / "docs").rglob("*.md"))
@@ -12,6 +14,7 @@ DOCUMENTS = sorted(
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 RUN = "python -m pipelines "
 PLACEHOLDER = "COMMAND"  # stands for any command
+COMMANDS = all_commands()
 
 
 def name(path):
@@ -27,6 +30,11 @@ def commands():
         for line in found:
             if line != PLACEHOLDER:
                 yield name(path), line
+
+
+def named(words):
+    """Name of the command that words behind `python -m pipelines` run: the first word, or two if it is of a group."""
+    return next(name for name in (words[0], " ".join(words[:2])) if name in COMMANDS)
 
 
 def programs():

@@ -7,14 +7,11 @@ import subprocess
 import sys
 
 import pytest
-from typer.main import get_command
 
-from pipelines.cli import app
-from tests.docs.documents import ROOT
+from tests.docs.documents import COMMANDS, ROOT
 from tests.timeless import timeless
 
 SCRIPTS = sorted((ROOT / "examples" / "cluster").glob("*.sh"))
-COMMANDS = get_command(app).commands  # pyright: ignore
 
 # Runs the tasks of an array one after the other, and a wrapped command at once.
 SBATCH = """\

@@ -1,5 +1,6 @@
 """Commands in the documents exist with the options that they are given, and the quick ones run."""
 
+import dataclasses
 import re
 import shlex
 import shutil
@@ -7,21 +8,24 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
-from typer.main import get_command
 
-from pipelines.cli import app
-from tests.docs.documents import ROOT, commands
+from pipelines.nightly.history import History
+from pipelines.nightly.other_code import digest_of
+from tests.docs.documents import COMMANDS, ROOT, commands, named
+from tests.pipelines.nightly import simulated
+from tests.pipelines.nightly.whole_nights import results
 
-COMMANDS = get_command(app).commands  # pyright: ignore
 LINES = sorted(set(commands()))
 # What needs a dataset at most, and seconds at most; the others render, measure or reproduce the paper.
 QUICK = {"describe", "detect", "doctor", "estimate", "recipes", "report", "score", "verify"}
+# What needs a history of nights; `nightly run` makes one, and renders.
+OF_HISTORY = {"nightly accept", "nightly explain", "nightly report"}
 
 
 @pytest.mark.parametrize(("document", "line"), LINES)
 def test_command_and_options_exist(document, line):
     words = shlex.split(line, comments=True)
-    command = COMMANDS[words[0]]
+    command = COMMANDS[named(words)]
     known = {option for parameter in command.params for option in (*parameter.opts, *parameter.secondary_opts)}
     assert {word for word in words if word.startswith("-")} <= known, f"{document}: {line}"
 
@@ -53,7 +57,7 @@ def test_quick_commands_run(place, cli):
     ran = set()
     for document, line in commands():
         words = tuple(shlex.split(line, comments=True))
-        if words[0] in QUICK and words not in ran:
+        if named(words) in QUICK and words not in ran:
             ran.add(words)
             done = cli(*words)
             assert done.code == 0, f"{document}: {line}: {done.err}"
@@ -66,3 +70,17 @@ def test_quick_commands_run(place, cli):
     assert statuses == {
         name: {"ok"} for name in ("mysolver@solve", "examples.own_solver@solve", "examples.own_estimator@estimate")
     }
+
+
+def test_commands_on_a_history_run(tmp_path, monkeypatch, cli):
+    """Each of the documents' on a night that found equisolid's corners worse."""
+    found = results(simulated.corner_bias(0.002))
+    code = digest_of()[:16]
+    night = dataclasses.replace(found.night, data=(*found.night.data, ("code", code)))
+    History(tmp_path / "out" / "nights").append(night, found.findings, found.alpha, found.measures)
+    monkeypatch.chdir(tmp_path)
+    lines = {line for _, line in LINES if named(shlex.split(line)) in OF_HISTORY}
+    assert {named(shlex.split(line)) for line in lines} == OF_HISTORY
+    for line in sorted(lines):
+        done = cli(*shlex.split(line))
+        assert done.code == 0, f"{line}: {done.err}"

@@ -10,7 +10,7 @@ import pytest
 
 from datasets.recipe.model import describe, recipe_names
 from datasets.schema import TABLES
-from pipelines.cli import COMMANDS
+from pipelines.cli import COMMANDS, NIGHTLY_COMMANDS, all_commands
 from tests.docs.documents import DOCUMENTS, ROOT
 from tools import reference
 
@@ -26,8 +26,9 @@ def test_links_between_documents_lead_somewhere():
 
 def test_the_reference_has_every_command_option_key_and_column():
     commands, keys, tables = reference.commands(), reference.recipe_keys(), reference.tables()
-    for command, example in COMMANDS:
-        assert f"## {command.__name__}\n" in commands
+    for name in all_commands():
+        assert f"## {name}\n" in commands
+    for _, example in (*COMMANDS, *NIGHTLY_COMMANDS):
         assert f"python -m pipelines {example}" in commands
     assert "`--overwrite`" in commands
     assert all(f"`{key}`" in keys for key, _, _ in describe())

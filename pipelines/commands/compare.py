@@ -1,0 +1,130 @@
+"""`compare`: whether one dataset's accuracy is worse than another's."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from datasets.errors import UserError
+from pipelines.commands import options as o
+from pipelines.commands.opening import opened
+from pipelines.commands.tables import Column, print_json, print_table
+
+if TYPE_CHECKING:
+    from pipelines.nightly.judgement import Failures, Finding, Judgement
+
+WORSE = 1  # exit code
+COLUMNS = (
+    Column("  verdict"), Column("metric"), Column("from", True), Column("to", True), Column("change, 95 %", True),
+)  # fmt: skip
+MOST_NAMED = 10  # frames that fail anew, in one line
+
+Old = Annotated[Path, typer.Argument(metavar="OLD", help="Folder of the dataset to compare with.")]
+New = Annotated[Path, typer.Argument(metavar="NEW", help="Folder of the dataset that is judged.")]
+Alpha = Annotated[float, typer.Option(help="Chance of a false alarm, over all metrics and slices together.")]
+
+
+def compare(old: Old, new: New, alpha: Alpha = 0.01, json: o.Json = False) -> None:
+    """Tell whether NEW is worse than OLD; exit code 1 if it is.
+
+    Both have been scored. The same views, with other code or another sensor, are compared frame by frame, which shows
+    the smallest changes; other views of the same recipe as two samples.
+    """
+    from pipelines.nightly.comparison import LEAST_POSES
+    from pipelines.nightly.judgement import judge
+    from pipelines.nightly.measures import measure, same_views
+
+    if not 0.0 < alpha < 1.0:
+        raise UserError(f"--alpha {alpha:g}: a chance lies between 0 and 1; take 0.01")
+    before, after = opened(old), opened(new)
+    found = judge(measure(before), measure(after), alpha, same_views(before, after))
+    if not found.findings and not found.identical:
+        few = f"have no slice with {LEAST_POSES} common poses"
+        raise UserError(f"{old} and {new} {few}; compare larger runs of one recipe")
+    if json:
+        print_json(_as_json(found, alpha))
+    else:
+        _print(found, alpha)
+    if _is_worse(found):
+        raise SystemExit(WORSE)
+
+
+def _is_worse(found: Judgement) -> bool:
+    return found.new_failures > 0 or any(item.verdict == "worse" for item in found.findings)
+
+
+def _print(found: Judgement, alpha: float) -> None:
+    from pipelines.nightly.comparison import Verdict
+
+    changed = found.of(Verdict.WORSE) + found.of(Verdict.BETTER)
+    for name in dict.fromkeys(item.slice for item in changed):
+        typer.echo(name)
+        print_table(COLUMNS, [_cells(item) for item in changed if item.slice == name])
+        typer.echo()
+    for item in found.failures:
+        if item.new:
+            typer.echo(_failure_line(item))
+    for names, side in ((found.only_old, "NEW"), (found.only_new, "OLD")):
+        if names:
+            typer.echo(f"not in {side}, so not compared: {', '.join(names)}")
+    typer.echo(_sentence(found, alpha))
+
+
+def _cells(item: Finding) -> tuple[str, ...]:
+    change = item.change
+    low, high = change.interval
+    unit = "" if change.metric.unit == "1" else f" ({change.metric.unit})"
+    numbers = f"{change.old:.3g}", f"{change.new:.3g}", f"{low:+.2g} to {high:+.2g}"
+    return f"  {item.verdict}", f"{change.metric.name}{unit}", *numbers
+
+
+def _failure_line(item: Failures) -> str:
+    shown = ", ".join(map(str, item.new[:MOST_NAMED])) + (", ..." if len(item.new) > MOST_NAMED else "")
+    return f"{item.slice}: {len(item.new)} of {item.frames} frames fail anew, {len(item.mended)} no longer: {shown}"
+
+
+def _sentence(found: Judgement, alpha: float) -> str:
+    from pipelines.nightly.comparison import Verdict
+
+    if found.identical:
+        return "identical: every number of every frame is the same"
+    counts = {verdict: len(found.of(verdict)) for verdict in Verdict}
+    told = ", ".join(f"{count} {verdict}" for verdict, count in counts.items() if count) or "nothing to compare"
+    how = "frame by frame" if found.paired else "as two samples of other views"
+    failed = f"; {found.new_failures} new failures" if found.paired else ""
+    return f"{len(found.findings)} metrics compared {how}, false alarms at {100 * alpha:g} %: {told}{failed}"
+
+
+def _as_json(found: Judgement, alpha: float) -> dict[str, Any]:
+    tests = max(len(found.findings), 1)
+    return {
+        "worse": _is_worse(found),
+        "identical": found.identical,
+        "paired": found.paired,
+        "alpha": alpha,
+        "only_old": found.only_old,
+        "only_new": found.only_new,
+        "failures": [
+            {"slice": item.slice, "frames": item.frames, "new": item.new, "mended": item.mended, "p": item.p}
+            for item in found.failures
+        ],
+        "findings": [
+            {
+                "slice": item.slice,
+                "metric": item.change.metric.name,
+                "unit": item.change.metric.unit,
+                "verdict": item.verdict,
+                "poses": item.change.poses,
+                "old": item.change.old,
+                "new": item.change.new,
+                "effect": item.change.effect,
+                "interval": item.change.interval,
+                "p": item.change.p,
+                "margin": item.change.metric.margin,
+                "smallest_visible": item.change.smallest_visible(alpha, tests),
+            }
+            for item in found.findings
+        ],
+    }

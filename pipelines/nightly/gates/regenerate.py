@@ -1,0 +1,74 @@
+"""Gate `regenerate`: some pinned frames, rendered again, are what they were.
+
+On the same type of processor and the same versions they are the same bits; elsewhere grey values may differ by one and
+true points by rounding. More means that tonight's fresh pictures would not be the kind that the baseline's numbers are
+about.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from datasets.plan import plan
+from datasets.rows import decode_image, points_by_frame
+from datasets.store.dataset import Dataset
+from pipelines.nightly.record import Exit, Outcome, State
+from pipelines.stages.generate import picture, true_points
+
+GATE = "regenerate"
+FRAMES = 10
+GREY_LEVELS = 1  # a value near the middle between two levels falls to either side
+POINTS_PX = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Again:
+    """One frame rendered again, beside the stored one."""
+
+    suite: str
+    frame_id: int
+    grey_levels: int  # largest difference of a pixel
+    points_px: float  # largest difference of a true point
+
+
+def render_again(suite: str, dataset: Dataset, count: int = FRAMES) -> list[Again]:
+    """Render evenly chosen frames of a dataset again, without writing anything.
+
+    Raises:
+        UserError: a shard is missing or damaged.
+    """
+    frames = plan(dataset.recipe)
+    chosen = {frames[int(i)].frame_id for i in np.linspace(0, len(frames) - 1, min(count, len(frames))).round()}
+    found: list[Again] = []
+    for path in dataset.shards("frames"):
+        ids = set(dataset.read_shard(path, ["frame_id"])["frame_id"].to_pylist()) & chosen
+        if not ids:
+            continue
+        truth = points_by_frame(dataset.read_shard(dataset.sibling(path, "keypoints")), dataset.recipe.target)
+        for row in dataset.read_shard(path, ["frame_id", "image"]).to_pylist():
+            if row["frame_id"] in ids:
+                frame = frames[row["frame_id"]]
+                stored = decode_image(row["image"], path, frame.frame_id).astype(np.int64)
+                grey = int(np.abs(stored - picture(dataset.recipe, frame)).max())
+                moved = np.abs(truth[frame.frame_id] - true_points(dataset.recipe, frame))
+                found.append(Again(suite, frame.frame_id, grey, float(np.nanmax(moved))))
+    return found
+
+
+def judge(again: list[Again], same_machine: bool) -> Outcome:
+    """same_machine: processor and versions are those that the pinned pictures were made with."""
+    grey, points = (0, 0.0) if same_machine else (GREY_LEVELS, POINTS_PX)
+    other = [item for item in again if item.grey_levels > grey or not item.points_px <= points]
+    if other:
+        worst = max(other, key=lambda item: (item.grey_levels, item.points_px))
+        told = (
+            f"{len(other)} of {len(again)} pinned frames come out otherwise, frame {worst.frame_id} of {worst.suite} "
+            f"by {worst.grey_levels} grey levels and {worst.points_px:.2g} px"
+        )
+        frames = tuple((item.suite, item.frame_id) for item in other)
+        return Outcome(GATE, State.FAILED, told, Exit.NO_VERDICT, frames=frames)
+    if any(item.grey_levels or item.points_px for item in again):
+        return Outcome(GATE, State.CHANGED, f"{len(again)} frames come out within one grey level on this other machine")
+    return Outcome(GATE, State.PASSED, f"{len(again)} pinned frames, rendered again, are the same bits")

@@ -1,0 +1,264 @@
+"""One night from beginning to end: pictures, what both codes read in them, the gates in their order."""
+
+from __future__ import annotations
+
+import datetime
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import pyarrow as pa
+from rich.console import Console
+
+from datasets.errors import UserError
+from datasets.store.atomic import own_name
+from datasets.store.dataset import Dataset
+from datasets.store.digest import combined_digest
+from datasets.store.lock import HeldError, hold
+from pipelines.engines.local import LocalEngine
+from pipelines.machine import provenance
+from pipelines.nightly import suites
+from pipelines.nightly.accepted import Baseline
+from pipelines.nightly.baselines import FILE_NAME, Baselines, load
+from pipelines.nightly.found import BASELINE, RAN, Found
+from pipelines.nightly.gates import accuracy, data, failures, fresh, regenerate, replay, speed, tail
+from pipelines.nightly.history import History, new_run_id
+from pipelines.nightly.judgement import Judgement, judge
+from pipelines.nightly.other_code import ROOT, Code, freeze
+from pipelines.nightly.outputs import write_all
+from pipelines.nightly.outputs.results import Results
+from pipelines.nightly.page.write import write_page
+from pipelines.nightly.record import Exit, Night, Outcome, State, Timing
+from pipelines.stages.settings import Setting
+
+WORK_PREFIX = ".work-"
+ENDED_WAIVERS = "ended waivers"  # name of a fact
+ORDER = ("data", "regenerate", "replay", "accuracy", "fresh", "failures", "tail", "speed")
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What is asked of a night."""
+
+    recipe: str
+    history: Path
+    regimes: tuple[str, ...]
+    seed: int  # of the fresh pictures
+    solvers: tuple[Setting, ...] = ()  # systems beside ours, judged on the pinned pictures
+    workers: int = 1
+    without: tuple[str, ...] = ()  # gates that are left out
+
+
+@dataclass(frozen=True, slots=True)
+class Desk:
+    """What the steps of a night work with."""
+
+    request: Request
+    history: History
+    work: Path
+    baselines: Baselines
+    engine: LocalEngine
+    console: Console
+
+    @property
+    def settings(self) -> tuple[Setting, ...]:
+        """What is estimated on the pinned pictures."""
+        return suites.READ + self.request.solvers
+
+    def waived(self, gate: str, place: str, what: str | int | None) -> bool:
+        """Whether somebody has accepted it."""
+        return self.baselines.is_waived(gate, place, what, datetime.date.today())
+
+
+def run_night(request: Request, console: Console) -> Night:
+    """Run a night and append it to the history. An error in a gate is that gate's outcome, with exit code 4.
+
+    Raises:
+        UserError: wrong use: a recipe, regime, solver or `baselines.toml` that is not usable, a damaged history, or a
+            folder that cannot be written.
+    """
+    started = datetime.datetime.now(datetime.UTC)
+    wanted = suites.suites(suites.PINNED, request.recipe, request.regimes)
+    baselines, history = load(request.history / FILE_NAME), History(request.history)
+    history.check()
+    baseline = next((item for item in reversed(baselines.baselines) if item.recipe == request.recipe), None)
+    found = Found(data={"code": freeze(request.history / "code").name})
+    with _work_folder(request.history) as work:
+        _judge_all(Desk(request, history, work, baselines, LocalEngine(request.workers), console), wanted, found)
+        left = [gate for gate in ORDER if gate not in {item.gate for item in found.outcomes}]
+        found.outcomes += [Outcome(gate, State.NOT_RUN, "nothing to judge") for gate in left]
+        night = Night(
+            new_run_id(started), started, request.recipe, baseline.name if baseline else "", tuple(_facts(baselines)),
+            tuple(found.data.items()), tuple(found.outcomes), tuple(found.timings),
+        )  # fmt: skip
+        history.append(night, found.findings, accuracy.ALPHA, found.measures)
+        write_all(Results(night, found.findings, accuracy.ALPHA, found.measures), request.history)
+        write_page(history, night.run_id, request.history / "report.html")
+    return night
+
+
+def machine() -> list[tuple[str, str]]:
+    """Versions, processor and BLAS kernel: where they differ, pictures may differ in a grey level."""
+    made = provenance()
+    return [("python", made.python), *made.libraries, ("processor", made.processor), ("blas", made.blas)]
+
+
+def _facts(baselines: Baselines) -> list[tuple[str, str]]:
+    """Commit and machine, and waivers that judge no longer."""
+    ended = baselines.expired(datetime.date.today())
+    return [("commit", provenance().commit), *machine(), *([(ENDED_WAIVERS, "; ".join(ended))] if ended else [])]
+
+
+def _judge_all(desk: Desk, wanted: list[suites.Suite], found: Found) -> None:
+    pictures: dict[str, Dataset] = {}
+    replayed: dict[str, str] = {}
+    with found.at_gate(RAN):
+        store = desk.request.history / "pictures"
+        pictures |= {suite.name: suite.make(store / suite.name, desk.engine, desk.console) for suite in wanted}
+        digests = {name: suites.pictures_digest(dataset) for name, dataset in pictures.items()}
+        found.data |= {suites.PINNED: combined_digest("", digests.items()), **digests}
+        found.measures["pinned new"], of_poses = _read_pinned(desk, pictures)
+        replayed |= of_poses
+        found.data |= {f"replay {name}": digest for name, digest in replayed.items()}
+        count = sum(dataset.read("frames", ["frame_id"]).num_rows for dataset in pictures.values())
+        found.outcomes.append(Outcome(RAN, State.PASSED, f"every stage ran on {count} pinned frames"))
+    if found.stopped():
+        return
+    baseline = _baseline(desk, found)
+    if baseline is not None:
+        _judge_data(desk, pictures, replayed, baseline, found)
+        if not found.stopped():
+            _judge_numbers(desk, pictures, baseline, found)
+
+
+def _baseline(desk: Desk, found: Found) -> Baseline | None:
+    """The current baseline; without one, or without its code, that is the night's outcome."""
+    recipe = desk.request.recipe
+    if all(item.recipe != recipe for item in desk.baselines.baselines):
+        told = f"there is no baseline of recipe {recipe} yet; make this run the first with `nightly accept`"
+        found.outcomes.append(Outcome(BASELINE, State.FAILED, told, Exit.NO_VERDICT))
+        return None
+    with found.at_gate(BASELINE):
+        return desk.baselines.current(recipe)
+
+
+def _judge_data(
+    desk: Desk, pictures: dict[str, Dataset], replayed: dict[str, str], baseline: Baseline, found: Found
+) -> None:
+    """Whether tonight's numbers can be compared with the baseline's at all."""
+    with found.at_gate(data.GATE):
+        found.outcomes.append(data.judge(found.data[suites.PINNED], baseline.pinned_data))
+    with found.at_gate(regenerate.GATE):
+        of_baseline = {item["name"]: item["value"] for item in desk.history.run(baseline.run)["facts"]}
+        same = all(of_baseline.get(name) == value for name, value in machine())
+        again = [item for name, dataset in pictures.items() for item in regenerate.render_again(name, dataset)]
+        found.outcomes.append(regenerate.judge(again, same))
+    with found.at_gate(replay.GATE):
+        known = {item["name"]: item["value"] for item in desk.history.run(baseline.run)["data"]}
+        old = {name.removeprefix("replay "): value for name, value in known.items() if name.startswith("replay ")}
+        found.outcomes.append(replay.judge(old, replayed))
+
+
+def _judge_numbers(desk: Desk, pictures: dict[str, Dataset], baseline: Baseline, found: Found) -> None:
+    pinned = tonight = None
+    with found.at_gate(accuracy.GATE):
+        old = desk.history.measures(baseline.measures[suites.PINNED])
+        found.measures["pinned old"] = old
+        pinned = judge(old, found.measures["pinned new"], accuracy.ALPHA, paired=True)
+        found.findings[suites.PINNED] = pinned.findings
+        found.outcomes.append(accuracy.judge(pinned, lambda *what: desk.waived(accuracy.GATE, *what)))
+    if pinned is None:
+        return
+    if fresh.GATE not in desk.request.without:
+        with found.at_gate(fresh.GATE):
+            tonight = _judge_fresh(desk, code_of(baseline, desk.request.history), found)
+    with found.at_gate(failures.GATE):
+        found.outcomes.append(failures.judge(pinned, tonight, lambda *what: desk.waived(failures.GATE, *what)))
+    with found.at_gate(tail.GATE):
+        old, new = (found.measures[f"pinned {side}"] for side in ("old", "new"))
+        found.outcomes.append(tail.judge(old, new, lambda *what: desk.waived(tail.GATE, *what)))
+    if speed.GATE not in desk.request.without:
+        with found.at_gate(speed.GATE):
+            found.timings += _timings(desk, code_of(baseline, desk.request.history), pictures)
+            found.outcomes.append(speed.judge(found.timings, lambda stage: desk.waived(speed.GATE, stage, None)))
+
+
+def _judge_fresh(desk: Desk, code: Code, found: Found) -> Judgement:
+    first = _compare_fresh(desk, code, suites.FRESH, desk.request.seed, found)
+
+    def again() -> Judgement:
+        return _compare_fresh(desk, code, suites.CONFIRMING, desk.request.seed + suites.CONFIRMING_SEED, found)
+
+    found.outcomes.append(fresh.judge(first, again, lambda *what: desk.waived(fresh.GATE, *what)))
+    return first
+
+
+def _compare_fresh(desk: Desk, code: Code, kind: str, seed: int, found: Found) -> Judgement:
+    sides: tuple[list[pa.Table], list[pa.Table]] = ([], [])
+    for suite in suites.suites(kind, desk.request.recipe, desk.request.regimes, seed):
+        pictures = suite.make(desk.work / suite.name, desk.engine, desk.console)
+        found.data[suite.name] = suites.pictures_digest(pictures)
+        before = suites.read_by(code, pictures, desk.work / f"{suite.name}-old", suites.READ, desk.request.workers)
+        after = suites.read_here(pictures, desk.work / f"{suite.name}-new", suites.READ, desk.engine, desk.console)
+        for side, reading in zip(sides, (before, after), strict=True):
+            side.append(reading.measures)
+    old, new = (pa.concat_tables(side) for side in sides)
+    found.measures |= {f"{kind} old": old, f"{kind} new": new}
+    judged = judge(old, new, fresh.ALPHA, paired=True)
+    found.findings[kind] = judged.findings
+    return judged
+
+
+def _read_pinned(desk: Desk, pictures: dict[str, Dataset]) -> tuple[pa.Table, dict[str, str]]:
+    tables: list[pa.Table] = []
+    replayed: dict[str, str] = {}
+    for name, dataset in pictures.items():
+        reading = suites.read_here(dataset, desk.work / name, desk.settings, desk.engine, desk.console)
+        tables.append(reading.measures)
+        replayed |= {f"{name} {setting}": digest for setting, digest in reading.replayed.items()}
+    return pa.concat_tables(tables), replayed
+
+
+def _timings(desk: Desk, code: Code, pictures: dict[str, Dataset]) -> list[Timing]:
+    name, dataset = next(iter(pictures.items()))
+    folders = tuple(suites.copy_pictures(dataset, desk.work / f"{name}-{side}") for side in ("time-old", "time-new"))
+    frames = dataset.read_shard(dataset.shards("frames")[0], ["frame_id"]).num_rows
+    return speed.time_both(code, Code(ROOT), (folders[0], folders[1]), frames)
+
+
+def code_of(baseline: Baseline, history: Path) -> Code:
+    """The baseline's code.
+
+    Raises:
+        UserError: it names an installed version whose folder is not there.
+    """
+    if baseline.checkout is not None:
+        return Code(baseline.checkout)
+    folder = history / "code" / f"eposit-{baseline.version}"
+    if not folder.is_dir():
+        wanted = f"pip install --no-deps --target {folder} eposit=={baseline.version}"
+        raise UserError(f"baseline {baseline.name} is version {baseline.version} of eposit, not in {folder}; {wanted}")
+    return Code(folder, ("eposit",))
+
+
+@contextmanager
+def _work_folder(history: Path) -> Iterator[Path]:
+    """A folder of this night alone; those that killed nights of this machine left are removed."""
+    for folder in history.glob(f"{WORK_PREFIX}*"):
+        try:
+            with hold(folder):
+                shutil.rmtree(folder, ignore_errors=True)
+        except (HeldError, OSError):
+            pass
+    work = history / own_name(WORK_PREFIX)
+    try:
+        work.mkdir(parents=True)
+    except OSError as error:
+        raise UserError(f"cannot write {work}: {error.strerror}; choose another --history") from error
+    with hold(work):
+        try:
+            yield work
+        finally:
+            shutil.rmtree(work, ignore_errors=True)

@@ -1,0 +1,151 @@
+"""The pictures of a night. Pinned ones are made once and kept; fresh ones have tonight's seed.
+
+Both are a dataset for each sensor regime. Whoever reads them, the candidate or the baseline's code, works on a folder
+of its own that shares the pictures and their truth with the suite.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import pyarrow as pa
+from rich.console import Console
+
+from datasets.errors import UserError
+from datasets.recipe.model import Recipe, load_recipe, parse_recipe
+from datasets.recipe.override import with_regime, with_values
+from datasets.store.claim import claim
+from datasets.store.dataset import RECIPE_FILE, Dataset, open_dataset
+from datasets.store.digest import combined_digest, table_digest
+from datasets.store.reuse import share_pictures
+from pipelines.engines.engine import Engine
+from pipelines.nightly.measures import measure
+from pipelines.nightly.other_code import Code
+from pipelines.stages import run as stages
+from pipelines.stages.settings import RUN_SETTINGS, Setting
+
+PINNED, FRESH, CONFIRMING = "pinned", "fresh", "confirming"
+FRESH_POSES = 20  # enough for every metric but the circle's, which the pinned pictures judge
+CONFIRMING_SEED = 1_000_000_000  # added to a night's seed
+EXACT = Setting(points="truth")
+NOISY = Setting(points="truth+noise", draws=1)
+READ = (RUN_SETTINGS[0], Setting(use="four"), EXACT, NOISY)  # what a night estimates
+REPLAYED = (EXACT, NOISY)
+
+
+@dataclass(frozen=True, slots=True)
+class Suite:
+    """Pictures of one kind in one sensor regime."""
+
+    kind: str
+    regime: str
+    recipe: Recipe
+    text: str
+
+    @property
+    def name(self) -> str:
+        """Name of its folder, and in tables."""
+        return f"{self.kind}-{self.regime}"
+
+    def make(self, folder: Path, engine: Engine, console: Console) -> Dataset:
+        """The pictures, rendered or resumed in a folder.
+
+        Raises:
+            UserError: the folder holds something else, or cannot be written.
+        """
+        with claim(folder, self.recipe, self.text) as dataset:
+            stages.run_generate(dataset, engine, console)
+        return dataset
+
+
+def suites(kind: str, recipe: str, regimes: Sequence[str], seed: int | None = None) -> list[Suite]:
+    """The suites of a recipe in several regimes. seed: instead of the recipe's; then scattered poses are fewer, too.
+
+    Raises:
+        UserError: no such recipe or regime.
+    """
+    loaded, text = load_recipe(recipe)
+    if seed is not None:
+        text = with_values(text, {("seed",): seed, **_fewer_poses(loaded)}, recipe)
+    found: list[Suite] = []
+    for regime in regimes:
+        own = with_regime(text, regime, recipe)
+        found.append(Suite(kind, regime, parse_recipe(own, f"recipe {recipe} with regime {regime}"), own))
+    return found
+
+
+def _fewer_poses(recipe: Recipe) -> dict[tuple[str, ...], int]:
+    count = getattr(recipe.trajectory, "count", None)
+    return {} if count is None else {("trajectory", "count"): min(count, FRESH_POSES)}
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What one system made of a suite."""
+
+    measures: pa.Table
+    replayed: dict[str, str]  # setting to the digest of its poses
+
+
+def read_here(
+    pictures: Dataset, folder: Path, settings: Sequence[Setting], engine: Engine, console: Console
+) -> Reading:
+    """Read a suite with this code, in a folder that shares its pictures."""
+    dataset = open_dataset(copy_pictures(pictures, folder))
+    stages.run_detect(dataset, engine, console)
+    stages.run_estimate(dataset, settings, engine, console)
+    stages.run_score(dataset, engine, console)
+    return _reading(dataset)
+
+
+def read_by(code: Code, pictures: Dataset, folder: Path, settings: Sequence[Setting], workers: int) -> Reading:
+    """Read a suite with other code.
+
+    Raises:
+        OtherCodeError: that code failed, as when it does not understand the pictures' tables.
+    """
+    copy_pictures(pictures, folder)
+    common = ("--workers", str(workers), "--quiet")
+    estimates = [("estimate", folder, *_options(setting), *common) for setting in settings]
+    code.run_all([("detect", folder, *common), *estimates, ("score", folder, *common)])
+    return _reading(open_dataset(folder))
+
+
+def copy_pictures(pictures: Dataset, folder: Path) -> Path:
+    """A new dataset's folder that shares the pictures and their truth of another."""
+    with claim(folder, pictures.recipe, (pictures.root / RECIPE_FILE).read_text(encoding="utf-8")) as dataset:
+        share_pictures(dataset, pictures)
+    return folder
+
+
+def _options(setting: Setting) -> tuple[str, ...]:
+    noise = ("--noise-px", repr(setting.noise_px), "--draws", str(setting.draws))
+    own = ("--solver", setting.solver, "--points", setting.points, "--camera", setting.camera, "--use", setting.use)
+    return own + (noise if setting.points == "truth+noise" else ())
+
+
+def _reading(dataset: Dataset) -> Reading:
+    replayed: dict[str, str] = {}
+    for setting in REPLAYED:
+        shards = [path for path in dataset.shards("estimates") if path.name.startswith(f"{setting.name}-")]
+        if shards:
+            replayed[setting.name] = _digest(dataset, shards)
+    return Reading(measure(dataset), replayed)
+
+
+def pictures_digest(dataset: Dataset) -> str:
+    """Hash of the decoded content of a dataset's pictures and their truth.
+
+    Raises:
+        UserError: it has none, or a shard is damaged.
+    """
+    paths = [path for table in ("frames", "keypoints") for path in dataset.shards(table)]
+    if not paths:
+        raise UserError(f"{dataset.root} holds no pictures; delete it, and the next night makes them again")
+    return _digest(dataset, paths)
+
+
+def _digest(dataset: Dataset, shards: Sequence[Path]) -> str:
+    return combined_digest("", ((path.name, table_digest(dataset.read_shard(path))) for path in shards))

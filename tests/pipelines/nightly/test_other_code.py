@@ -1,0 +1,64 @@
+"""The baseline's code: a frozen copy runs, and nothing else answers in its place."""
+
+import shutil
+
+import pytest
+
+from datasets.store.dataset import open_dataset
+from datasets.store.verify import verify
+from pipelines.nightly.other_code import ROOT, Code, OtherCodeError, digest_of, freeze
+
+
+@pytest.fixture(scope="module")
+def frozen(tmp_path_factory):
+    return freeze(tmp_path_factory.mktemp("code"))
+
+
+def test_frozen_code_makes_the_same_scores(frozen, tiny, tmp_path, content):
+    folder = tmp_path / "dataset"
+    shutil.copytree(tiny[1], folder)
+    for table in ("estimates", "scores"):
+        shutil.rmtree(folder / table)
+    code = Code(frozen)
+    code.run("estimate", folder, "--quiet")
+    code.run("score", folder, "--quiet")
+    (shard, *_) = open_dataset(folder).shards("scores")
+    assert (
+        open_dataset(folder).read_shard(shard).equals(open_dataset(tiny[1]).read_shard(tiny[1] / "scores" / shard.name))
+    )
+    assert verify(open_dataset(folder))[1] == []
+
+
+def test_a_change_in_the_copy_is_what_runs(frozen, tmp_path):
+    """The copy answers and not the checkout, whose link in this environment puts itself first."""
+    changed = tmp_path / "changed"
+    shutil.copytree(frozen, changed)
+    (changed / "eposit" / "__init__.py").write_text("raise SystemExit('this is the copy')")
+    with pytest.raises(OtherCodeError, match="this is the copy"):
+        Code(changed).run("recipes")
+
+
+def test_a_folder_without_a_package_does_not_run_the_checkouts(frozen, tmp_path):
+    partial = tmp_path / "partial"
+    shutil.copytree(frozen, partial)
+    shutil.rmtree(partial / "eposit")
+    with pytest.raises(OtherCodeError, match=r"eposit is .*, not in"):
+        Code(partial).run("recipes")
+
+
+def test_the_library_alone_can_be_another(frozen, tmp_path):
+    library = tmp_path / "library"
+    shutil.copytree(frozen / "eposit", library / "eposit")
+    Code(library, ("eposit",)).run("recipes")
+
+
+def test_what_fails_is_told(frozen):
+    with pytest.raises(OtherCodeError, match="nosuch"):
+        Code(frozen).run("describe", "nosuch")
+
+
+def test_the_same_files_have_one_copy(tmp_path):
+    first, second = freeze(tmp_path), freeze(tmp_path)
+    assert first == second
+    assert digest_of(first) == digest_of(ROOT)
+    assert [path.name for path in tmp_path.iterdir()] == [first.name]
