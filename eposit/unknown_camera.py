@@ -7,12 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eposit.arrays import Array, Mask
 from eposit.camera import Camera
+from eposit.least_squares import Minima
 from eposit.pose import Pose
 from eposit.problem import validate
 from eposit.solution import OK, STATUS_TYPE, Solution, Status
@@ -72,6 +74,8 @@ class CameraCandidates:
     cost: Array  # (..., k) sum of squared reprojection errors, px^2; NaN where a point is not in front of the camera
     f_px: Array  # (..., k) focal length along x, px
     k_per_px2: Array  # (..., k) distortion, px^-2
+    steps: NDArray[np.int64]  # (..., k) of the least squares; 0 after the last candidate
+    converged: Mask  # (..., k) it is a minimum (GPnPf) or reproduces its points (PnPfr); False after the last candidate
     count: int | NDArray[np.int64]  # how many there are, of one problem or (b,)
 
 
@@ -89,9 +93,8 @@ class Estimate(Solution):
         f, k = float(np.asarray(camera.f_px)[0]), float(np.asarray(camera.k_per_px2)[0])
         camera = Division(f, k, camera.cx, camera.cy, camera.aspect)
         poses = Pose(found.poses.R[0], found.poses.t[0])
-        candidates = CameraCandidates(
-            poses, found.cost[0], found.f_px[0], found.k_per_px2[0], int(np.asarray(found.count)[0])
-        )
+        arrays = (found.cost[0], found.f_px[0], found.k_per_px2[0], found.steps[0], found.converged[0])
+        candidates = CameraCandidates(poses, *arrays, int(np.asarray(found.count)[0]))
         rmse, spread = one.reprojection_rmse_px, one.covariance
         return Estimate(
             one.status, one.cam_from_obj, one.iterations, rmse, spread, camera=camera, candidates=candidates
@@ -133,22 +136,26 @@ def in_chunks(images: Images, candidates_of: Callable[[Array], CameraCandidates]
     offsets = images.offsets
     parts = [candidates_of(offsets[i : i + CHUNK]) for i in range(0, max(1, len(offsets)), CHUNK)]
     R, t = (np.concatenate([getattr(part.poses, name) for part in parts]) for name in ("R", "t"))
-    rest = (np.concatenate([getattr(part, name) for part in parts]) for name in ("cost", "f_px", "k_per_px2", "count"))
-    return CameraCandidates(Pose(R, t), *rest)
+    names = ("cost", "f_px", "k_per_px2", "steps", "converged", "count")
+    return CameraCandidates(Pose(R, t), *(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
 def table(
-    width: int, rows: NDArray[np.int64], b: int, R: Array, t: Array, f_px: Array, k_per_px2: Array
+    width: int, rows: NDArray[np.int64], b: int, pose: Pose, f_px: Array, k_per_px2: Array, minima: Minima
 ) -> CameraCandidates:
     """CameraCandidates (m, ...) of the problems `rows` (m,), in rising order, spread over (b, width); no cost yet."""
     count = np.bincount(rows, minlength=b)
     column = np.arange(len(rows)) - np.repeat(np.cumsum(count) - count, count)
-    spread: list[Array] = []
-    for values in (R, t, f_px, k_per_px2):
-        wide = np.full((b, width, *values.shape[1:]), np.nan)
+
+    def spread(values: NDArray[Any], empty: float) -> NDArray[Any]:
+        wide = np.full((b, width, *values.shape[1:]), empty, values.dtype)
         wide[rows, column] = values
-        spread.append(wide)
-    return CameraCandidates(Pose(spread[0], spread[1]), np.full((b, width), np.nan), spread[2], spread[3], count)
+        return wide
+
+    poses = Pose(spread(pose.R, np.nan), spread(pose.t, np.nan))
+    f, k = spread(f_px, np.nan), spread(k_per_px2, np.nan)
+    steps, converged = spread(minima.steps, 0), spread(minima.converged, False)
+    return CameraCandidates(poses, np.full((b, width), np.nan), f, k, steps, converged, count)
 
 
 def reprojection_squares(images: Images, found: CameraCandidates) -> Array:
@@ -159,14 +166,16 @@ def reprojection_squares(images: Images, found: CameraCandidates) -> Array:
     return np.sum((estimated.project(np.swapaxes(seen, -1, -2)) - images.points_px[:, None]) ** 2, axis=(-1, -2))
 
 
-def choose(
-    images: Images, found: CameraCandidates, rank: Array, steps: int, unusable: Status | None = None
-) -> Estimate:
-    """The candidate of lowest finite rank (b, k) of each image, the earlier of equals; NaN pose where there is none."""
+def choose(images: Images, found: CameraCandidates, rank: Array, unusable: Status | None = None) -> Estimate:
+    """The candidate of lowest finite rank (b, k) of each image, the earlier of equals.
+
+    NaN pose where there is none, and where the limit of steps stopped its least squares: more steps may lead elsewhere.
+    """
     b = np.arange(len(rank))
     order = np.where(np.isfinite(rank), rank, np.inf)
     best = np.argmin(order, axis=1)
     status = np.where(np.isfinite(order[b, best]), Status.OK, Status.NO_SOLUTION).astype(STATUS_TYPE)
+    status[(status == Status.OK) & ~found.converged[b, best]] = Status.NOT_CONVERGED
     if unusable is not None:
         status[:] = unusable
     status[~images.finite] = Status.NON_FINITE
@@ -177,6 +186,6 @@ def choose(
     camera = images.camera
     estimated = Division(f, k, camera.cx, camera.cy, camera.fy / camera.fx)
     pose, spread = Pose(R, np.where(ok[:, None], t, np.nan)), np.full((len(b), 6, 6), np.nan)
-    taken = np.where(ok, steps, 0)
+    taken = found.steps[b, best]
     estimate = Estimate(status, pose, taken, rmse, spread, camera=estimated, candidates=found)
     return estimate.first() if images.single else estimate

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import MISSING, asdict, fields, is_dataclass
 from typing import Any, get_args, get_type_hints
 
@@ -16,17 +16,20 @@ from datasets.trajectories import TRAJECTORIES
 from render.sensor.presets import DEFAULT_REGIME, SensorModel, regime_of, regimes
 
 Key = tuple[str, str, str]  # key, default, meaning
+Place = tuple[int | str, ...]  # where a fault is, in Pydantic's form
 REGIME = "sensor.regime"
 CAMERAS_FROM = f"cameras.{FROM}"
 OWN_VALUES = "own values"  # shown where values have no name
-UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")  # Pydantic's types of fault
+# What Pydantic calls these faults, and how the names of types begin that it puts between keys.
+UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
+MISSING_KEY = ("missing", "missing_argument", "missing_keyword_only_argument")
+TYPE_NAMES = ("tuple[", "literal[")
 
 
 def keys_of(model: type[BaseModel]) -> Iterator[Key]:
     """Key, default and meaning of every key of a recipe's model."""
     for name, info in model.model_fields.items():
-        sections = [kind for kind in (info.annotation, *get_args(info.annotation)) if isinstance(kind, type)]
-        sections = [kind for kind in sections if is_dataclass(kind)]
+        sections = _sections(info.annotation)
         default = "required" if info.is_required() else toml_value(info.default)
         yield name, "section" if sections else default, info.description or ""
         if SensorModel in sections:
@@ -36,6 +39,11 @@ def keys_of(model: type[BaseModel]) -> Iterator[Key]:
             choice = ", ".join(camera_references())
             yield CAMERAS_FROM, toml_value(None), f"whose values the keys below have that are left out: {choice}"
         yield from ((f"{name}.{key}", default, meaning) for key, default, meaning in _merged(sections))
+
+
+def _sections(hint: Any) -> list[type]:
+    """The dataclasses that a key's values are, or are lists of; several where the section has several kinds."""
+    return [kind for kind in (hint, *get_args(hint)) if isinstance(kind, type) and is_dataclass(kind)]
 
 
 def _merged(sections: list[type]) -> Iterator[Key]:
@@ -77,22 +85,30 @@ def toml_value(value: Any) -> str:
 
 def values_of(recipe: BaseModel) -> dict[str, str]:
     """Key to value for every key that a recipe takes; those of the cameras are lists over the cameras."""
-    found: dict[str, str] = {}
-    for key, _, _ in keys_of(type(recipe)):
-        head, _, tail = key.partition(".")
-        value = getattr(recipe, head)
-        if key == REGIME:
-            found[key] = toml_value(regime_of(value) or OWN_VALUES)
-        elif key == CAMERAS_FROM:
-            found[key] = ", ".join(toml_value(reference_of(camera) or OWN_VALUES) for camera in value)
-        elif head == "cameras":
-            shown = [toml_value(getattr(camera, tail)) for camera in value] if tail else [f"{len(value)} cameras"]
-            found[key] = ", ".join(shown)
-        elif not tail:
-            found[key] = "section" if is_dataclass(value) else toml_value(value)
-        elif tail.partition(".")[0] in field_names(type(value)):  # not a key of another kind of trajectory
-            found[key] = _shown(value, tail)
-    return found
+    found = {key: _value_of(recipe, key) for key, _, _ in keys_of(type(recipe))}
+    return {key: value for key, value in found.items() if value is not None}
+
+
+def _value_of(recipe: BaseModel, key: str) -> str | None:
+    """A key's value; None for a key of another kind of trajectory than the recipe's."""
+    head, _, tail = key.partition(".")
+    value = getattr(recipe, head)
+    if key == REGIME:
+        return toml_value(regime_of(value) or OWN_VALUES)
+    if head == "cameras":
+        return _shown_cameras(value, tail)
+    if not tail:
+        return "section" if is_dataclass(value) else toml_value(value)
+    return _shown(value, tail) if tail.partition(".")[0] in field_names(type(value)) else None
+
+
+def _shown_cameras(cameras: Sequence[CameraSpec], key: str) -> str:
+    """What each camera has under a key; without one how many cameras there are."""
+    if not key:
+        return f"{len(cameras)} cameras"
+    if key == FROM:
+        return ", ".join(toml_value(reference_of(camera) or OWN_VALUES) for camera in cameras)
+    return ", ".join(toml_value(getattr(camera, key)) for camera in cameras)
 
 
 def _shown(section: Any, tail: str) -> str:
@@ -114,27 +130,52 @@ def sentence(error: ValidationError, model: type[BaseModel]) -> str:
     """The first fault of a validation as one sentence with the key's path."""
     # A misspelt key is missing under its right name as well: what is unknown comes first.
     first = min(error.errors(include_url=False), key=lambda fault: fault["type"] not in UNKNOWN_KEY)
-    kind = TRAJECTORIES.get(str(first["loc"][1])) if first["loc"][:1] == ("trajectory",) and first["loc"][1:] else None
-    parts = [part for i, part in enumerate(first["loc"]) if not (kind and i == 1)]
-    path = [str(part) for part in parts if not (isinstance(part, str) and part.startswith(("tuple[", "literal[")))]
-    key, fault, given = ".".join(path) or "recipe", first["type"], first.get("input")
+    path, fault, message = _path(first["loc"]), first["type"], first["msg"]
+    key = ".".join(path) or "recipe"
     if fault in UNKNOWN_KEY:
-        known = field_names(kind) if kind and len(path) == 2 else _keys_beside(path, model)
-        where = f"known keys of kind {_kind(kind)!r} are" if kind and len(path) == 2 else "known keys there are"
-        return f"unknown key {key!r}{did_you_mean(path[-1], known)}; {where} {', '.join(known)}"
-    if fault in ("missing", "missing_argument", "missing_keyword_only_argument"):
+        return f"unknown key {key!r}{_known_instead(path, _trajectory_at(first['loc']), model)}"
+    if fault in MISSING_KEY:
         return f"key {key!r} is missing; add it"
     if fault == "value_error":
-        return str(first.get("ctx", {}).get("error", first["msg"]))
-    plain = ".".join(part for part in path if not part.isdigit())
-    meaning = next((text for name, _, text in keys_of(model) if name == plain), "")
-    return f"key {key!r} is {_short(given)} ({first['msg'][:1].lower()}{first['msg'][1:]}); it takes: {meaning}"
+        return str(first.get("ctx", {}).get("error", message))
+    given, why = _short(first.get("input")), message[:1].lower() + message[1:]
+    return f"key {key!r} is {given} ({why}); it takes: {_meaning(path, model)}"
+
+
+def _trajectory_at(place: Place) -> type | None:
+    """The kind of trajectory that a place in a recipe lies in; Pydantic names it behind the key `trajectory`."""
+    return TRAJECTORIES.get(str(place[1])) if len(place) > 1 and place[0] == "trajectory" else None
+
+
+def _path(place: Place) -> list[str]:
+    """The keys to a place as a recipe has them: without the types that Pydantic names between them."""
+    parts = place[:1] + place[2:] if _trajectory_at(place) else place
+    return [str(part) for part in parts if not str(part).startswith(TYPE_NAMES)]
+
+
+def _known_instead(path: list[str], trajectory: type | None, model: type[BaseModel]) -> str:
+    """What stands behind an unknown key: the one that may be meant, and all that are known there."""
+    if trajectory and len(path) == 2:
+        known, where = field_names(trajectory), f"known keys of kind {_kind(trajectory)!r} are"
+    else:
+        known, where = _keys_beside(path, model), "known keys there are"
+    return f"{did_you_mean(path[-1], known)}; {where} {', '.join(known)}"
+
+
+def _meaning(path: list[str], model: type[BaseModel]) -> str:
+    key = _without_numbers(path)
+    return next((meaning for name, _, meaning in keys_of(model) if name == key), "")
 
 
 def _keys_beside(path: list[str], model: type[BaseModel]) -> list[str]:
-    prefix = ".".join(part for part in path[:-1] if not part.isdigit())
-    keys = [key for key, _, _ in keys_of(model)]
-    return [key.rpartition(".")[2] for key in keys if key.rpartition(".")[0] == prefix]
+    section = _without_numbers(path[:-1])
+    keys = [key.rpartition(".") for key, _, _ in keys_of(model)]
+    return [name for prefix, _, name in keys if prefix == section]
+
+
+def _without_numbers(path: list[str]) -> str:
+    """A path as `keys_of` names it: without the places in lists."""
+    return ".".join(part for part in path if not part.isdigit())
 
 
 def _short(value: Any) -> str:

@@ -7,7 +7,7 @@ cannot tell apart count as one: every NaN and a null, zero of either sign.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -44,23 +44,42 @@ def combined_digest(start: str, parts: Iterable[tuple[str, str]]) -> str:
 
 
 def _values(column: Any) -> Iterator[bytes]:
-    kind = column.type
-    if pa.types.is_struct(kind):
-        yield from (_image(row.as_py()) for row in column)
-    elif pa.types.is_floating(kind) or is_list_of_floats(kind):
-        values = with_nans(column).astype("<f8")
-        yield np.where(np.isnan(values), np.nan, values + 0.0).tobytes()  # one NaN, one zero
-    elif pa.types.is_integer(kind) or pa.types.is_boolean(kind):
-        if column.null_count:
-            yield column.is_valid().to_numpy(zero_copy_only=False).tobytes()
-            column = column.fill_null(False if pa.types.is_boolean(kind) else 0)
-        yield np.asarray(column.to_numpy(zero_copy_only=False), dtype="<i8").tobytes()
-    elif pa.types.is_string(kind):
-        yield b"\0".join(NO_TEXT if text is None else text.encode() for text in column.to_pylist())
-    else:
-        raise TypeError(f"a column of type {kind} has no canonical form; give it one here")
+    """A column's values as bytes that do not depend on its storage: alike where the values count as one."""
+    form = next((form for is_of_type, form in FORMS if is_of_type(column.type)), None)
+    if form is None:
+        raise TypeError(f"a column of type {column.type} has no canonical form; give it one here")
+    return form(column)
 
 
-def _image(row: dict[str, Any]) -> bytes:
-    pixels = decode_png(row["bytes"])
-    return f"{pixels.shape}".encode() + pixels.tobytes()
+def _images(column: Any) -> Iterator[bytes]:
+    for row in column:
+        pixels = decode_png(row.as_py()["bytes"])
+        yield f"{pixels.shape}".encode() + pixels.tobytes()
+
+
+def _floats(column: Any) -> Iterator[bytes]:
+    values = with_nans(column).astype("<f8")
+    yield np.where(np.isnan(values), np.nan, values + 0.0).tobytes()  # one NaN, one zero
+
+
+def _whole_numbers(column: Any) -> Iterator[bytes]:
+    """Integers or booleans; nulls count as 0, behind a mask that tells them from it."""
+    if column.null_count:
+        yield column.is_valid().to_numpy(zero_copy_only=False).tobytes()
+        column = column.fill_null(False if pa.types.is_boolean(column.type) else 0)
+    yield np.asarray(column.to_numpy(zero_copy_only=False), dtype="<i8").tobytes()
+
+
+def _texts(column: Any) -> Iterator[bytes]:
+    yield b"\0".join(NO_TEXT if text is None else text.encode() for text in column.to_pylist())
+
+
+# The canonical form of each type of column; no type is in two lines.
+FORMS: tuple[tuple[Callable[[pa.DataType], bool], Callable[[Any], Iterator[bytes]]], ...] = (
+    (pa.types.is_struct, _images),
+    (pa.types.is_floating, _floats),
+    (is_list_of_floats, _floats),
+    (pa.types.is_integer, _whole_numbers),
+    (pa.types.is_boolean, _whole_numbers),
+    (pa.types.is_string, _texts),
+)

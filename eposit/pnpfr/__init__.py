@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from eposit.arrays import Array, Mask
 from eposit.camera import Camera
-from eposit.least_squares import damped_gauss_newton
+from eposit.least_squares import Minima, damped_gauss_newton
 from eposit.pnpfr.polynomials import SOLUTIONS, Complex, dual_basis, solve_roots
 from eposit.pose import Pose, rotation_from_vector
 from eposit.shape import Shape
@@ -52,18 +53,19 @@ def solve(
         raise ValueError(f"points_in_obj has {len(images.points_in_obj)} points; PnPfr takes exactly 4, choose four")
     if not Shape.of(images.points_in_obj).solid:
         found = in_chunks(images, _nothing)
-        return choose(images, found, found.cost, 0, Status.COPLANAR)
+        return choose(images, found, found.cost, Status.COPLANAR)
     found = in_chunks(images, partial(_candidates, images.points_in_obj))
     cost = reprojection_squares(images, found)
     with np.errstate(invalid="ignore"):
         cost = np.where(cost < REPRODUCED_PX2, cost, np.nan)
-    found = CameraCandidates(found.poses, cost, found.f_px, found.k_per_px2, found.count)
-    return choose(images, found, np.where(np.isnan(cost), np.nan, np.abs(found.k_per_px2)), STEPS)
+    found = replace(found, cost=cost, converged=np.isfinite(cost))  # a step relative to k says nothing where k = 0
+    return choose(images, found, np.where(np.isnan(cost), np.nan, np.abs(found.k_per_px2)))
 
 
 def _nothing(offsets: Array) -> CameraCandidates:
-    rows, none = np.zeros(0, np.int64), np.zeros((0, 3))
-    return table(SOLUTIONS, rows, len(offsets), np.zeros((0, 3, 3)), none, none[:, 0], none[:, 0])
+    rows, none = np.zeros(0, np.int64), np.zeros(0)
+    minima = Minima(np.zeros((5, 0)), rows, np.zeros(0, bool))
+    return table(SOLUTIONS, rows, len(offsets), Pose(np.zeros((0, 3, 3)), np.zeros((0, 3))), none, none, minima)
 
 
 def _candidates(points_in_obj: Array, offsets: Array) -> CameraCandidates:
@@ -83,13 +85,13 @@ def _candidates(points_in_obj: Array, offsets: Array) -> CameraCandidates:
     which, image = which[order], image[order]
     dual, seen = dual_basis(obj), w[:, image].T
     unknowns = np.concatenate((depths.real[:, which, image], roots.k.real[None, which, image]))
-    unknowns = damped_gauss_newton(partial(_model, dual, seen), unknowns, STEPS)
-    k = unknowns[4]
-    pose, f, sound = _poses(dual, seen, unknowns[:4].T, k)
+    minima = damped_gauss_newton(partial(_model, dual, seen), unknowns, STEPS)
+    k = minima.x[4]
+    pose, f, sound = _poses(dual, seen, minima.x[:4].T, k)
     t = pose.t * size - (pose.R @ ASKEW) @ points_in_obj[0]
-    rows, R = image[sound], (pose.R @ ASKEW)[sound]
+    rows, pose = image[sound], Pose((pose.R @ ASKEW)[sound], t[sound])
     f_px, k_per_px2 = f[sound] * scale[rows], k[sound] / scale[rows] ** 2
-    return table(SOLUTIONS, rows, len(offsets), R, t[sound], f_px, k_per_px2)
+    return table(SOLUTIONS, rows, len(offsets), pose, f_px, k_per_px2, minima.take(sound))
 
 
 def _rows(dual: Array, w: Complex, depths: Array, k: Array) -> tuple[Array, Array, Array]:
@@ -98,12 +100,12 @@ def _rows(dual: Array, w: Complex, depths: Array, k: Array) -> tuple[Array, Arra
     return (w.real * depths) @ dual, (w.imag * depths) @ dual, (bent * depths) @ dual
 
 
-def _model(dual: Array, w: Complex, unknowns: Array) -> tuple[Array, Array]:
+def _model(dual: Array, all_w: Complex, unknowns: Array, rows: NDArray[np.int64]) -> tuple[Array, Array]:
     """|p1| = |p2| and p1 . p2 = p1 . p3 = p2 . p3 = 0 in the depths and k, (5, m): what they miss, and their slopes.
 
     All four hold for any common factor of the depths. A fifth equation without a residual keeps steps from changing it.
     """
-    depths, k = unknowns[:4].T, unknowns[4]
+    depths, k, w = unknowns[:4].T, unknowns[4], all_w[rows]
     u, v, r2 = w.real, w.imag, np.abs(w) ** 2
     p1, p2, p3 = _rows(dual, w, depths, k)
     y1, y2, y3, bent = p1 @ dual.T, p2 @ dual.T, p3 @ dual.T, 1.0 + k[:, None] * r2

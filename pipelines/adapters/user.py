@@ -7,7 +7,7 @@ import importlib
 import inspect
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -129,10 +129,17 @@ def _read(result: Any, what: str) -> PoseResult:
     """None, (R, t), (R, t, status), or an object with `status` and `cam_from_obj` or `R` and `t`."""
     if result is None:
         return PoseResult(Status.NO_SOLUTION)
-    if isinstance(result, tuple | list):
-        if len(result) not in (2, 3):
-            raise UserError(f"{what} gave {len(result)} values; it must give R and t, or R, t and a status")
-        return _answer(result[0], result[1], result[2] if len(result) == 3 else Status.OK, what)
+    return _of_values(result, what) if isinstance(result, tuple | list) else _of_object(result, what)
+
+
+def _of_values(result: Sequence[Any], what: str) -> PoseResult:
+    if len(result) not in (2, 3):
+        raise UserError(f"{what} gave {len(result)} values; it must give R and t, or R, t and a status")
+    return _answer(result[0], result[1], result[2] if len(result) == 3 else Status.OK, what)
+
+
+def _of_object(result: Any, what: str) -> PoseResult:
+    """An answer with the object's `iterations` and `covariance`, where it has them."""
     pose = getattr(result, "cam_from_obj", result)
     for holder, name in ((result, "status"), (pose, "R"), (pose, "t")):
         if not hasattr(holder, name):
@@ -149,16 +156,22 @@ def _read(result: Any, what: str) -> PoseResult:
 
 
 def _answer(R: Any, t: Any, status: Any, what: str) -> PoseResult:
-    if not isinstance(status, str) or not status or (status != Status.OK and status.strip().lower() == Status.OK):
+    if not _is_status(status):
         raise UserError(f'{what} gave the status {status!r}; it must be a text, "ok" or the reason of a failure')
     if status != Status.OK:
         return PoseResult(str(status))
     if R is None or t is None:
         return PoseResult(Status.NO_SOLUTION)
-    position = np.asarray(t) if isinstance(t, np.ndarray) and t.shape in ((3, 1), (1, 3)) else t
-    position = np.ravel(position) if isinstance(position, np.ndarray) else position
     rotation = _numbers(R, (3, 3), f"{what} gave R")
+    position = np.ravel(t) if isinstance(t, np.ndarray) else t  # OpenCV gives a column
     return PoseResult(Status.OK, rotation, _numbers(position, (3,), f"{what} gave t"))
+
+
+def _is_status(value: Any) -> bool:
+    """Whether a value is a text that says something; ok must be spelt so, or a pose would count as a failure."""
+    if not isinstance(value, str) or not value:
+        return False
+    return value == Status.OK or value.strip().lower() != Status.OK
 
 
 def _numbers(value: Any, shape: tuple[int, ...], what: str) -> Array:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from datasets.plan import plan
+from datasets.plan import Frame, plan
 from datasets.recipe.model import Recipe
 from datasets.store.images import encode_png
 from datasets.store.linear_images import write_linear
@@ -27,35 +27,43 @@ POSES, SCALES, SAMPLES = (1, 2, 4), (0.5, 1.0, 2.0), (64, 256, 1024)  # poses, r
 def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
     """Exponents of frames, pixels and samples."""
     del poses  # three sizes are three sizes
-    staged = by_pose(recipe)
-    runs = [functools.partial(run_stages, staged, chosen_poses(recipe, count)) for count in POSES]
-    cameras = len(recipe.cameras)
-    yield _row("all stages at {} frames", [cameras * count for count in POSES], runs)
+    yield _stages_by_frames(recipe)
+    sizes = [scaled(recipe, factor) for factor in SCALES]
     for camera in (recipe.cameras[0].name, recipe.cameras[-1].name):
-        sizes = [scaled(recipe, factor) for factor in SCALES]
-        pixels = [size.cameras[0].width * size.cameras[0].height for size in sizes]
-        yield _row(
-            camera + ": frame without detection at {} pixels",
-            pixels,
-            [functools.partial(_frame, size, camera) for size in sizes],
-        )
-        images = [_image(size, camera) for size in sizes]
-        yield _row(
-            camera + ": detection at {} pixels",
-            pixels,
-            [functools.partial(detect_points, image, recipe.target) for image in images],
-        )
-        frame = next(frame for frame in plan(recipe) if frame.camera.name == camera)
-        yield _row(
-            camera + ": render at {} samples",
-            SAMPLES,
-            [functools.partial(linear_of, recipe, frame, samples) for samples in SAMPLES],
-        )
+        yield _frame_by_pixels(sizes, camera)
+        yield _detection_by_pixels(sizes, camera)
+        yield _render_by_samples(recipe, camera)
 
 
 def exponent(sizes: Sequence[float], seconds: Sequence[float]) -> float:
     """Slope of log seconds over log size."""
     return float(np.polyfit(np.log(sizes), np.log(seconds), 1)[0])
+
+
+def _stages_by_frames(recipe: Recipe) -> Row:
+    staged = by_pose(recipe)
+    runs = [functools.partial(run_stages, staged, chosen_poses(recipe, count)) for count in POSES]
+    return _row("all stages at {} frames", [len(recipe.cameras) * count for count in POSES], runs)
+
+
+def _frame_by_pixels(sizes: Sequence[Recipe], camera: str) -> Row:
+    frames = [functools.partial(_frame, size, camera) for size in sizes]
+    return _row(camera + ": frame without detection at {} pixels", _pixels(sizes), frames)
+
+
+def _detection_by_pixels(sizes: Sequence[Recipe], camera: str) -> Row:
+    detections = [functools.partial(detect_points, _image(size, camera), size.target) for size in sizes]
+    return _row(camera + ": detection at {} pixels", _pixels(sizes), detections)
+
+
+def _render_by_samples(recipe: Recipe, camera: str) -> Row:
+    frame = _first_frame(recipe, camera)
+    renders = [functools.partial(linear_of, recipe, frame, samples) for samples in SAMPLES]
+    return _row(camera + ": render at {} samples", SAMPLES, renders)
+
+
+def _pixels(sizes: Sequence[Recipe]) -> list[int]:
+    return [size.cameras[0].width * size.cameras[0].height for size in sizes]
 
 
 def _row(what: str, sizes: Sequence[float], calls: Sequence[Callable[[], object]]) -> Row:
@@ -70,12 +78,16 @@ def _row(what: str, sizes: Sequence[float], calls: Sequence[Callable[[], object]
 
 def _frame(recipe: Recipe, camera: str) -> None:
     with tempfile.TemporaryDirectory() as folder:
-        frame = next(frame for frame in plan(recipe) if frame.camera.name == camera)
+        frame = _first_frame(recipe, camera)
         linear = linear_of(recipe, frame)
         write_linear(linear, frame.camera.true_camera(), Path(folder) / "linear.exr")
         encode_png(develop(linear.full(frame.camera.true_camera()), frame.sensor))
 
 
 def _image(recipe: Recipe, camera: str) -> np.ndarray:
-    frame = next(frame for frame in plan(recipe) if frame.camera.name == camera)
+    frame = _first_frame(recipe, camera)
     return develop(linear_of(recipe, frame).full(frame.camera.true_camera()), frame.sensor)
+
+
+def _first_frame(recipe: Recipe, camera: str) -> Frame:
+    return next(frame for frame in plan(recipe) if frame.camera.name == camera)

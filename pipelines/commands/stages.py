@@ -16,6 +16,7 @@ from pipelines.stages.part import part_of
 
 if TYPE_CHECKING:
     from datasets.store.dataset import Dataset
+    from pipelines.stages.missing import Execution
 
 
 def run(
@@ -36,15 +37,16 @@ def run(
     from pipelines.stages.kernels import compiled_ahead
     from pipelines.stages.settings import RUN_SETTINGS, settings_of
 
-    console, part, place = Console(quiet=quiet), part_of(shard), engine_of(engine, workers, ray_address)
+    execution = _execution(engine, workers, ray_address, shard, quiet)
     settings = [*RUN_SETTINGS, *settings_of(solver or [])]
-    shared, keep_masters = not part.is_whole, not no_masters
-    with begin(recipe, out, regime, reuse, console, shared=shared, keep_masters=keep_masters) as dataset:
-        with compiled_ahead(dataset, part) as kernels:  # beside the first pictures
-            stages.run_generate(dataset, place, console, part)
-            stages.run_detect(dataset, place, console, part=part, kernels=kernels)
-        stages.run_estimate(dataset, settings, place, console, part)
-        stages.run_score(dataset, place, console, part)
+    shared, console = not execution.part.is_whole, execution.console
+    with begin(recipe, out, regime, reuse, console, shared=shared, keep_masters=not no_masters) as dataset:
+        with compiled_ahead(dataset, execution.part) as kernels:  # beside the first pictures
+            stages.run_generate(dataset, execution)
+            stages.run_detect(dataset, execution, kernels=kernels)
+        stages.run_estimate(dataset, settings, execution)
+        stages.run_score(dataset, execution)
+        part = execution.part
         if part.is_whole:
             _report(dataset)
         else:
@@ -81,10 +83,10 @@ def generate(
     """Render images with their truth."""
     from pipelines.stages import run as stages
 
-    console, part, place = Console(quiet=quiet), part_of(shard), engine_of(engine, workers, ray_address)
-    shared, keep_masters = not part.is_whole, not no_masters
-    with begin(recipe, out, regime, reuse, console, shared=shared, keep_masters=keep_masters) as dataset:
-        stages.run_generate(dataset, place, console, part)
+    execution = _execution(engine, workers, ray_address, shard, quiet)
+    shared, console = not execution.part.is_whole, execution.console
+    with begin(recipe, out, regime, reuse, console, shared=shared, keep_masters=not no_masters) as dataset:
+        stages.run_generate(dataset, execution)
 
 
 def detect(
@@ -99,9 +101,9 @@ def detect(
     """Find corners and circle in the images; each detector's points stay beside the others'."""
     from pipelines.stages import run as stages
 
-    part, place = part_of(shard), engine_of(engine, workers, ray_address)
-    with writing(folder, shared=not part.is_whole) as dataset:
-        stages.run_detect(dataset, place, Console(quiet=quiet), detector, part)
+    execution = _execution(engine, workers, ray_address, shard, quiet)
+    with writing(folder, shared=not execution.part.is_whole) as dataset:
+        stages.run_detect(dataset, execution, detector)
 
 
 def estimate(
@@ -126,15 +128,15 @@ def estimate(
     from pipelines.stages.settings import Setting, System
 
     setting = Setting("best" if solver is None else solver, points, camera, use, noise_px, draws, detector)
-    console, part, place = Console(quiet=quiet), part_of(shard), engine_of(engine, workers, ray_address)
+    execution = _execution(engine, workers, ray_address, shard, quiet)
     if estimator is None:
-        with writing(folder, shared=not part.is_whole) as dataset:
-            stages.run_estimate(dataset, [setting], place, console, part, overwrite=overwrite)
+        with writing(folder, shared=not execution.part.is_whole) as dataset:
+            stages.run_estimate(dataset, [setting], execution, overwrite=overwrite)
         return
     if solver is not None or setting != Setting(camera=camera):
         raise UserError("--estimator is given images: leave out --solver and the options that choose points")
-    with writing(folder, shared=not part.is_whole) as dataset:
-        stages.run_system(dataset, System(estimator, camera), place, console, part, overwrite=overwrite)
+    with writing(folder, shared=not execution.part.is_whole) as dataset:
+        stages.run_system(dataset, System(estimator, camera), execution, overwrite=overwrite)
 
 
 def score(
@@ -158,11 +160,11 @@ def score(
         raise UserError("--camera goes with --poses; leave it out, or give a file of poses")
     if poses is not None and shard is not None:
         raise UserError("--poses takes a file as a whole; leave out --shard")
-    console, part, place = Console(quiet=quiet), part_of(shard), engine_of(engine, workers, ray_address)
-    with writing(folder, shared=not part.is_whole) as dataset:
+    execution = _execution(engine, workers, ray_address, shard, quiet)
+    with writing(folder, shared=not execution.part.is_whole) as dataset:
         if poses is not None and name is not None:
-            stages.run_import(dataset, poses, System(name, camera), console)
-        stages.run_score(dataset, place, console, part)
+            stages.run_import(dataset, poses, System(name, camera), execution)
+        stages.run_score(dataset, execution)
 
 
 def report(folder: o.Folder) -> None:
@@ -170,6 +172,18 @@ def report(folder: o.Folder) -> None:
     dataset = opened(folder)
     _report(dataset)
     complete_manifest(dataset)
+
+
+def _execution(engine: str, workers: int, ray_address: str | None, shard: str | None, quiet: bool) -> Execution:
+    """What the options about where and how much mean.
+
+    Raises:
+        UserError: a part or an engine that is not usable.
+    """
+    from pipelines.stages.missing import Execution
+
+    part = part_of(shard)
+    return Execution(engine_of(engine, workers, ray_address), Console(quiet=quiet), part)
 
 
 def _report(dataset: Dataset) -> None:

@@ -137,31 +137,47 @@ def recipes(json: o.Json = False) -> None:
 
 def describe(recipe: o.ShownRecipe = None, json: o.Json = False) -> None:
     """Every key of a recipe with its meaning: its defaults, the sensor's regimes and cameras to name, or its values."""
-    from datasets.recipe.camera_sets import camera_rows
-    from datasets.recipe.model import describe as keys
-    from datasets.recipe.model import load_recipe, values
-    from render.sensor.presets import regime_rows, regimes
-
-    rows, names = list(keys()), tuple(regimes())
-    if recipe:
-        given = values(load_recipe(recipe)[0])
-        rows = [(key, given[key], meaning) for key, _, meaning in rows if key in given]
+    rows = _described_keys(recipe)
     if json:
         titles = ("key", "value" if recipe else "default", "meaning")
-        told: dict[str, object] = {"keys": [dict(zip(titles, row, strict=True)) for row in rows]}
-        if not recipe:
-            told["regimes"] = {f"sensor.{key}": dict(zip(names, row, strict=True)) for key, row in regime_rows()}
-            told["cameras"] = {name: asdict(camera) for name, camera in camera_rows()}
-        print_json(told)
+        keys = [dict(zip(titles, row, strict=True)) for row in rows]
+        print_json({"keys": keys} if recipe else {"keys": keys, **_what_recipes_name()})
         return
     print_keys(rows)
     if not recipe:
-        typer.echo("\nThe sensor's regimes:\n")
-        columns = (Column("key"), *(Column(name, number=True) for name in names))
-        print_table(columns, [(f"sensor.{key}", *map(str, row)) for key, row in regime_rows()])
-        typer.echo("\nCameras that a recipe can name:\n")
-        numbers = ("fx", "fy", "cx", "cy", "width", "height", "nominal_f")
-        columns = (Column("cameras.from"), *(Column(name, number=True) for name in numbers))
-        print_table(
-            columns, [(name, *(str(getattr(camera, key)) for key in numbers)) for name, camera in camera_rows()]
-        )
+        _print_what_recipes_name()
+
+
+def _described_keys(recipe: str | None) -> list[tuple[str, str, str]]:
+    """Key, value and meaning of every key that a recipe takes; of every key that there is, with its default."""
+    from datasets.recipe.model import describe as keys
+    from datasets.recipe.model import load_recipe, values
+
+    if not recipe:
+        return list(keys())
+    given = values(load_recipe(recipe)[0])
+    return [(key, given[key], meaning) for key, _, meaning in keys() if key in given]
+
+
+def _what_recipes_name() -> dict[str, object]:
+    """The sensor's regimes and the cameras that come along, for JSON."""
+    from datasets.recipe.camera_sets import camera_rows
+    from render.sensor.presets import regime_rows, regimes
+
+    return {
+        "regimes": {f"sensor.{key}": dict(zip(regimes(), row, strict=True)) for key, row in regime_rows()},
+        "cameras": {name: asdict(camera) for name, camera in camera_rows()},
+    }
+
+
+def _print_what_recipes_name() -> None:
+    from datasets.recipe.camera_sets import camera_rows
+    from render.sensor.presets import regime_rows, regimes
+
+    typer.echo("\nThe sensor's regimes:\n")
+    settings = [(f"sensor.{key}", *map(str, row)) for key, row in regime_rows()]
+    print_table((Column("key"), *(Column(name, number=True) for name in regimes())), settings)
+    typer.echo("\nCameras that a recipe can name:\n")
+    numbers = ("fx", "fy", "cx", "cy", "width", "height", "nominal_f")
+    cameras = [(name, *(str(getattr(camera, key)) for key in numbers)) for name, camera in camera_rows()]
+    print_table((Column("cameras.from"), *(Column(key, number=True) for key in numbers)), cameras)

@@ -10,7 +10,8 @@ from eposit.arrays import Array, Mask
 from pipelines.detection.board_map import BoardMap, grid, normal_angles
 from pipelines.detection.circle_surroundings import ellipses_around_circle
 from pipelines.detection.consistency import Corners, drop_inconsistent
-from pipelines.detection.corner_model import BLUR, CONTRAST, MEAN, SHAPE, SLOPE, CornerTask, fit_corners
+from pipelines.detection.corner_model import fit_corners
+from pipelines.detection.corner_picture import BLUR, CONTRAST, MEAN, SHAPE, SLOPE, CornerTask
 from pipelines.detection.finders import Grey
 from render.targets.chessboard import Chessboard
 

@@ -24,6 +24,7 @@ from pipelines.engines.engine import Engine
 from pipelines.nightly.measures import measure
 from pipelines.nightly.other_code import Code
 from pipelines.stages import run as stages
+from pipelines.stages.missing import Execution
 from pipelines.stages.settings import RUN_SETTINGS, Setting
 
 PINNED, FRESH, CONFIRMING = "pinned", "fresh", "confirming"
@@ -57,7 +58,7 @@ class Suite:
             UserError: the folder holds something else, or cannot be written.
         """
         with claim(folder, self.recipe, self.text) as dataset:
-            stages.run_generate(dataset, engine, console)
+            stages.run_generate(dataset, Execution(engine, console))
         return dataset
 
 
@@ -101,9 +102,10 @@ def read_here(
 ) -> Reading:
     """Read a suite with this code, in a folder that shares its pictures."""
     dataset = open_dataset(copy_pictures(pictures, folder))
-    stages.run_detect(dataset, engine, console)
-    stages.run_estimate(dataset, settings, engine, console)
-    stages.run_score(dataset, engine, console)
+    execution = Execution(engine, console)
+    stages.run_detect(dataset, execution)
+    stages.run_estimate(dataset, settings, execution)
+    stages.run_score(dataset, execution)
     return _reading(dataset)
 
 

@@ -59,29 +59,42 @@ def reproduce(out: Path, only: Sequence[str], seeds: int, points_only: bool, wor
     """
     if not 1 <= seeds <= MAX_SEEDS:
         raise UserError(f"{seeds} draws of noise are not usable; give --seeds from 1 to {MAX_SEEDS}")
-    engine = LocalEngine(workers)
-    console, sections, claims = Console(), list[PaperSection](), list[Claim]()
+    engine, sections = LocalEngine(workers), list[PaperSection]()
     # The batches are of small matrices, which threads only slow down.
-    with Progress(console=console) as progress, threadpool_limits(1):
+    with Progress(console=Console()) as progress, threadpool_limits(1):
         known = parts(out, seeds, engine, lambda text: progress.update(bar, description=text))
-        for name in only:
-            if name not in known:
-                raise UserError(f"unknown part {name!r}; choose one of {', '.join(known)}")
-        chosen = [name for name in known if (not only or name in only) and not (points_only and name in IMAGE_PARTS)]
-        if not chosen:
-            raise UserError(f"--points-only leaves out {', '.join(only)}; drop one of the two options")
-        try:
-            out.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise refused(out, error) from error
+        chosen = _chosen(list(known), only, points_only)
+        _make_folder(out)
         bar = progress.add_task("", total=len(chosen))
         for name in chosen:
             progress.update(bar, description=name)
-            for section in known[name]():
-                sections.append(section)
-                claims += section.claims
+            sections += known[name]()
             progress.advance(bar)
+    claims = [claim for section in sections for claim in section.claims]
     return write(out, sections, claims, seeds)
+
+
+def _chosen(known: Sequence[str], only: Sequence[str], points_only: bool) -> list[str]:
+    """Names of the parts to measure, in the order of the page.
+
+    Raises:
+        UserError: an unknown part, or nothing is left.
+    """
+    for name in only:
+        if name not in known:
+            raise UserError(f"unknown part {name!r}; choose one of {', '.join(known)}")
+    left_out = IMAGE_PARTS if points_only else ()
+    chosen = [name for name in known if name in (only or known) and name not in left_out]
+    if not chosen:
+        raise UserError(f"--points-only leaves out {', '.join(only)}; drop one of the two options")
+    return chosen
+
+
+def _make_folder(out: Path) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise refused(out, error) from error
 
 
 def write(out: Path, sections: Sequence[PaperSection], claims: Sequence[Claim], seeds: int) -> tuple[Path, Path]:

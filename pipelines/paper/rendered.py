@@ -22,6 +22,7 @@ from pipelines.paper.beyond.field_images import field_of_images
 from pipelines.paper.claims import PaperSection
 from pipelines.paper.simulation import COMPONENTS, LENSES, UNITS
 from pipelines.report.sections import Table
+from pipelines.stages.missing import Execution
 from pipelines.stages.run import run_detect, run_estimate, run_generate, run_score
 from pipelines.stages.settings import Setting
 from pipelines.statistics import bootstrap, mean, median
@@ -50,11 +51,11 @@ def images(folder: Path, engine: Engine, tell: Callable[[str], None]) -> PaperSe
     Raises:
         UserError: the folder holds something else, or the disk refuses.
     """
-    dataset, console = pictures(RECIPE, folder, engine, tell), Console(quiet=True)
+    dataset, execution = pictures(RECIPE, folder, engine, tell), Execution(engine, Console(quiet=True))
     tell("images: estimates")
     with hold(dataset.root):
-        run_estimate(dataset, SETTINGS, engine, console)
-        run_score(dataset, engine, console)
+        run_estimate(dataset, SETTINGS, execution)
+        run_score(dataset, execution)
     scores, cameras = dataset.read("scores"), dataset.read("frames", ["frame_id", "camera_name"])
     tables = tuple(
         _table(scores, cameras, title, take) for title, take in (("Mean errors", _mean), ("Medians", _median))
@@ -82,12 +83,12 @@ def wide(folder: Path, engine: Engine, tell: Callable[[str], None]) -> PaperSect
 def pictures(name: str, folder: Path, engine: Engine, tell: Callable[[str], None]) -> Dataset:
     """The dataset of a recipe that comes along, rendered and detected; what is there is kept."""
     recipe, text = load_recipe(name)
-    console = Console(quiet=True)
+    execution = Execution(engine, Console(quiet=True))
     with claim(folder, recipe, text, provenance=provenance()) as dataset:
         tell(f"{name}: rendering")
-        run_generate(dataset, engine, console)
+        run_generate(dataset, execution)
         tell(f"{name}: detection")
-        run_detect(dataset, engine, console)
+        run_detect(dataset, execution)
     return dataset
 
 

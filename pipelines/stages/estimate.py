@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from datasets.rows import camera_of, covariances_by_frame, estimate_rows, points
 from datasets.schema import FRAMES
 from datasets.store.dataset import Dataset
 from eposit import Solution, Status
-from eposit.arrays import Array
+from eposit.arrays import Array, Mask
 from pipelines.adapters.registry import find_solver, takes_theta_centre
 from pipelines.adapters.results import PoseResult, Solver, gather
 from pipelines.adapters.user import is_given
@@ -56,6 +56,20 @@ def path_of_shard(dataset: Dataset, index: int, name: str) -> Path:
     return dataset.shard_path("estimates", index, shard_count(dataset.recipe), name)
 
 
+@dataclass(frozen=True, slots=True)
+class _SolverInput:
+    """What a solver is given of one frame."""
+
+    points_in_obj: Array  # (n, 3) mm
+    points_px: Array  # (b, n, 2), one image for each draw; NaN where a point was not found
+    sigma_px: Array | float | None  # as for `eposit.solve`; None for points without noise
+
+    @property
+    def has_enough_points(self) -> bool:
+        """Whether the four points that a pose needs were found."""
+        return bool(np.sum(_is_found(self.points_px)) >= 4)
+
+
 def _estimate(
     dataset: Dataset,
     frame: dict[str, Any],
@@ -65,26 +79,46 @@ def _estimate(
     solver: Solver,
 ) -> pa.Table:
     """Rows of one frame, one for each draw. sigma: (n, 2, 2) covariances of detected points, px^2."""
-    target = dataset.recipe.target
-    chosen = np.array(dataset.recipe.four_indices()) if setting.use == "four" else np.arange(len(target.points))
-    noisy = setting.points == "truth+noise"
-    draws = range(setting.draws if noisy else 1)
-    batch = np.stack([points_px + _noise(dataset, frame, draw, setting) if noisy else points_px for draw in draws])[
-        :, chosen
-    ]
-    found = np.all(np.isfinite(batch[0]), axis=1)
-    if setting.use == "all":  # a point that was not found takes no part; of four, none may be missing
-        chosen, batch = chosen[found], batch[:, found]
-    if np.sum(found) < 4:
-        answers = [PoseResult(Status.POINTS_MISSING)] * len(batch)
-        solution = gather(target.points[chosen], batch, camera_of(frame), answers, single=False)
-    else:
-        known = setting.noise_px if noisy else None if sigma is None else sigma[chosen]
-        solution = solve_with(setting, target.points[chosen], batch, frame, known, solver)
-        if known is None or not (setting.solver == REACHES_BOUND or is_given(setting.solver)):
-            solution = replace(solution, covariance=np.full((len(batch), 6, 6), np.nan))
+    given = _solver_input(dataset, frame, points_px, sigma, setting)
+    solution = _solved(given, frame, setting, solver)
+    draws = range(len(given.points_px))
     key = (setting.solver, setting.points_name, setting.camera, setting.use)
-    return estimate_rows([frame["frame_id"]] * len(batch), draws, key, solution, len(chosen))
+    return estimate_rows([frame["frame_id"]] * len(draws), draws, key, solution, len(given.points_in_obj))
+
+
+def _solver_input(
+    dataset: Dataset, frame: dict[str, Any], points_px: Array, sigma: Array | None, setting: Setting
+) -> _SolverInput:
+    """The points that the setting chooses, with its noise. Of all points, those that were not found are left out."""
+    points_in_obj, noisy, four = dataset.recipe.target.points, setting.points == "truth+noise", setting.use == "four"
+    images = [points_px]
+    if noisy:
+        images = [points_px + _noise(dataset, frame, draw, setting) for draw in range(setting.draws)]
+    chosen = np.array(dataset.recipe.four_indices()) if four else np.arange(len(points_in_obj))
+    batch = np.stack(images)[:, chosen]
+    if not four:
+        found = _is_found(batch)
+        chosen, batch = chosen[found], batch[:, found]
+    if noisy:
+        return _SolverInput(points_in_obj[chosen], batch, setting.noise_px)
+    return _SolverInput(points_in_obj[chosen], batch, None if sigma is None else sigma[chosen])
+
+
+def _is_found(batch: Array) -> Mask:
+    """(n,) which points of (b, n, 2) px were found; the draws of noise have the same."""
+    return np.all(np.isfinite(batch[0]), axis=1)
+
+
+def _solved(given: _SolverInput, frame: dict[str, Any], setting: Setting, solver: Solver) -> Solution:
+    """The poses of each draw, with their covariance where the solver's reaches the bound and the points' is known."""
+    b = len(given.points_px)
+    if not given.has_enough_points:
+        answers = [PoseResult(Status.POINTS_MISSING)] * b
+        return gather(given.points_in_obj, given.points_px, camera_of(frame), answers, single=False)
+    solution = solve_with(setting, given.points_in_obj, given.points_px, frame, given.sigma_px, solver)
+    if given.sigma_px is not None and (setting.solver == REACHES_BOUND or is_given(setting.solver)):
+        return solution
+    return replace(solution, covariance=np.full((b, 6, 6), np.nan))
 
 
 def _noise(dataset: Dataset, frame: dict[str, Any], draw: int, setting: Setting) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,7 @@ MATRIX = tuple(f"r{row}{column}" for row in "123" for column in "123")
 POSITIONS = (POSITION_COLUMNS, tuple(f"t{axis}" for axis in "xyz"))
 FORM = "frame_id, q_w q_x q_y q_z or r11 to r33, and t_x_mm t_y_mm t_z_mm or tx ty tz in mm"
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,63}")
+NamesAndColumns = tuple[list[str], list[list[Any]]]
 TOLERANCE = 1e-3  # of a quaternion's length and of R^T R - 1: three decimals
 
 
@@ -94,24 +96,14 @@ def read_poses(path: Path) -> dict[int, PoseResult]:
 def _columns(path: Path) -> dict[str, list[Any]]:
     """Name to values; of CSV they are text.
 
-    `csv` reads it and not `pyarrow.csv`, which guesses types (`true` becomes 1, text that is not UTF-8 becomes bytes, a
-    wrong number a column of text), keeps blanks before names and quotes, and counts lines without the empty ones: it
-    could not say which value of which line is wrong.
-
     Raises:
         UserError: a file that cannot be read.
     """
+    read = READERS.get(path.suffix.lower())
+    if read is None:
+        raise UserError(f"{path} is neither .csv nor .parquet; give --poses one of them")
     try:
-        if path.suffix.lower() == ".parquet":
-            table = pq.read_table(path)
-            header, values = table.column_names, [column.to_pylist() for column in table.columns]
-        elif path.suffix.lower() == ".csv":
-            with open(path, encoding="utf-8-sig", newline="") as file:
-                first, *rows = list(csv.reader(file, skipinitialspace=True)) or [[]]
-            header = [name.strip() for name in first]
-            values = _transposed(path, header, rows)
-        else:
-            raise UserError(f"{path} is neither .csv nor .parquet; give --poses one of them")
+        header, values = read(path)
     except UnicodeDecodeError:
         raise UserError(f"cannot read {path}: it is not UTF-8 text; give --poses a .csv or .parquet file") from None
     except OSError as error:
@@ -122,6 +114,27 @@ def _columns(path: Path) -> dict[str, list[Any]]:
     if twice is not None:
         raise UserError(f"{path} has the column {twice!r} twice; leave one out")
     return dict(zip(header, values, strict=True))
+
+
+def _read_parquet(path: Path) -> NamesAndColumns:
+    table = pq.read_table(path)
+    return table.column_names, [column.to_pylist() for column in table.columns]
+
+
+def _read_csv(path: Path) -> NamesAndColumns:
+    """A CSV file's header and columns.
+
+    `csv` reads it and not `pyarrow.csv`, which guesses types (`true` becomes 1, text that is not UTF-8 becomes bytes, a
+    wrong number a column of text), keeps blanks before names and quotes, and counts lines without the empty ones: it
+    could not say which value of which line is wrong.
+    """
+    with open(path, encoding="utf-8-sig", newline="") as file:
+        first, *rows = list(csv.reader(file, skipinitialspace=True)) or [[]]
+    header = [name.strip() for name in first]
+    return header, _transposed(path, header, rows)
+
+
+READERS: dict[str, Callable[[Path], NamesAndColumns]] = {".parquet": _read_parquet, ".csv": _read_csv}
 
 
 def _transposed(path: Path, header: list[str], rows: list[list[str]]) -> list[list[Any]]:

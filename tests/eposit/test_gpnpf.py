@@ -121,7 +121,31 @@ def test_more_points_are_used():
         ten.append(rotation_error_rad(gpnpf.solve(points, noisy, BLIND).cam_from_obj.R, pose.R))
     few, many = (np.nan_to_num(np.concatenate(errors), nan=np.pi) for errors in (four, ten))
     assert 2.5 * np.median(many) < np.median(few)  # 4.6 measured
-    assert np.mean(many == np.pi) <= 0.03
+    assert np.mean(many == np.pi) <= 0.05  # 9 without a solution and 2 not converged of 300 measured
+
+
+@pytest.mark.parametrize("short", [True, False])
+@pytest.mark.parametrize("n", [5, 8])
+def test_what_is_called_ok_has_arrived(n, short, monkeypatch):
+    """Any limit of steps leaves some images on their way, and their status says so. The others are at a minimum, and
+    with the limit of `solve` at the lowest, where no more steps lead elsewhere."""
+    rng, slow, limit = np.random.default_rng(61), 0, 15 if short else gpnpf.STEPS
+    for points, _, _, pixels in problems(rng, 120, n=n, each=30):
+        noisy = pixels + rng.normal(0.0, 0.4, pixels.shape)
+        monkeypatch.setattr(gpnpf, "STEPS", limit)
+        found = gpnpf.solve(points, noisy, BLIND)
+        monkeypatch.setattr(gpnpf, "STEPS", 800)
+        end = gpnpf.solve(points, noisy, BLIND)
+        ok = found.status == "ok"
+        assert set(found.status) <= {"ok", "not_converged", "no_solution"}
+        assert np.all(np.isnan(found.cam_from_obj.t[~ok]))
+        assert np.all(np.isnan(found.camera.f_px[~ok]))
+        assert np.all(found.iterations[ok] <= limit)
+        minima = end.candidates.f_px[ok] if short else end.camera.f_px[ok, None]
+        # A last step below 1e-11 of slow convergence may leave a hundred or a thousand times that.
+        assert np.all(np.nanmin(np.abs(minima / found.camera.f_px[ok, None] - 1.0), axis=1) < 1e-7)
+        slow += int(np.sum(found.status == "not_converged"))
+    assert slow >= 20 if short else slow <= 6, slow
 
 
 def test_a_batch_gives_what_single_calls_give():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,7 +21,7 @@ from pipelines.paper.beyond.field import LIMIT_DEG, SOLVERS, curves, solve_by
 from pipelines.paper.claims import PaperSection
 from pipelines.report.sections import Drawing, Table
 from pipelines.stages.detect import path_of
-from pipelines.statistics import percent, wilson
+from pipelines.statistics import Interval, percent, wilson
 
 ROTATION_DEG = 2.0
 RELATIVE = 0.02  # of the distance
@@ -50,20 +50,10 @@ def field_of_images(folder: Path) -> PaperSection:
     """
     dataset = open_dataset(folder)
     obj = dataset.recipe.target.points[np.array(dataset.recipe.four_indices())]
-    seen = list(_pictures(dataset))
+    seen = _by_angle(_pictures(dataset))
     if not seen:
         raise UserError(f"{folder} has no frames; run the recipe wide into it first")
-    angles = tuple(sorted({one.angle for one in seen}))
-    found = {
-        name: [wilson(np.array([_succeeds(name, obj, one) for one in seen if one.angle == a and one.found] or [False]))
-               for a in angles]
-        for name in SOLVERS
-    }  # fmt: skip
-    rows: list[tuple[str, ...]] = []
-    for i, angle in enumerate(angles):
-        here = [one.found for one in seen if one.angle == angle]
-        shares = tuple(percent(found[name][i], 0) if any(here) else "no board found" for name in SOLVERS)
-        rows.append((str(angle), f"{sum(here)} of {len(here)}", *shares))
+    found = {name: [_success(name, obj, pictures) for pictures in seen.values()] for name in SOLVERS}
     head = ("board's centre off the axis, deg", "boards found", *SOLVERS)
     note = (
         f"Success: rotation within {ROTATION_DEG:g} degrees and position within {100 * RELATIVE:g} % of the distance, "
@@ -75,12 +65,35 @@ def field_of_images(folder: Path) -> PaperSection:
         "where the board's centre does not. The circle is 10 mm high: the four points are nearly flat, which the "
         "linear methods pay for."
     )
-    drawing = Drawing("Success on detected points", curves(angles, {"detected points": found}))
+    drawing = Drawing("Success on detected points", curves(tuple(seen), {"detected points": found}))
     return PaperSection(
         "Field angle in rendered pictures",
         intro,
-        (drawing, Table("Success on detected points", head, tuple(rows), note)),
+        (drawing, Table("Success on detected points", head, _rows(seen, found), note)),
     )
+
+
+def _by_angle(pictures: Iterable[_Seen]) -> dict[int, list[_Seen]]:
+    """Field angle to its pictures, from the axis outwards."""
+    found: dict[int, list[_Seen]] = {}
+    for one in pictures:
+        found.setdefault(one.angle, []).append(one)
+    return dict(sorted(found.items()))
+
+
+def _success(name: str, points_in_obj: Array, pictures: Iterable[_Seen]) -> Interval:
+    """A solver's share of the boards that were found; 0 where none was."""
+    return wilson(np.array([_succeeds(name, points_in_obj, one) for one in pictures if one.found] or [False]))
+
+
+def _rows(seen: dict[int, list[_Seen]], found: dict[str, list[Interval]]) -> tuple[tuple[str, ...], ...]:
+    """A row for each angle. found: a solver's intervals, in the order of the angles."""
+    rows: list[tuple[str, ...]] = []
+    for (angle, pictures), *shares in zip(seen.items(), *found.values(), strict=True):
+        boards = sum(one.found for one in pictures)
+        cells = [percent(share, 0) if boards else "no board found" for share in shares]
+        rows.append((str(angle), f"{boards} of {len(pictures)}", *cells))
+    return tuple(rows)
 
 
 def _succeeds(name: str, points_in_obj: Array, one: _Seen) -> bool:

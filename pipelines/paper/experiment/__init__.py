@@ -65,14 +65,15 @@ def measure(folder: Path, tell: Callable[[str], None] = lambda _: None) -> Paper
 def dataset_in(folder: Path, tell: Callable[[str], None]) -> Dataset:
     """The pictures with both detectors' points; what is there is not done again."""
     from pipelines.stages import run as stages
+    from pipelines.stages.missing import Execution
 
     recipe, text = load_recipe(RECIPE)
     tell(f"experiment: {len(plan(recipe))} pictures in {folder}")
-    quiet = Console(quiet=True)
+    execution = Execution(LocalEngine(), Console(quiet=True))
     with claim(folder, recipe, text, provenance=provenance()) as dataset:
-        stages.run_generate(dataset, LocalEngine(), quiet)
+        stages.run_generate(dataset, execution)
         for detector in DETECTORS:
-            stages.run_detect(dataset, LocalEngine(), quiet, detector)
+            stages.run_detect(dataset, execution, detector)
     return dataset
 
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from pipelines.detection.corner_model import BLUR, SHAPE, CornerTask, fit_corners
+from pipelines.detection.corner_model import fit_corners
+from pipelines.detection.corner_picture import BLUR, SHAPE, CornerTask
 from pipelines.detection.corners import FINAL, REACH, STOP
 from tests.supersampled import digitised, picture, side
 
