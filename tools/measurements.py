@@ -17,7 +17,6 @@ import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 from datasets.errors import UserError
 from datasets.store.atomic import write_text
@@ -37,6 +36,17 @@ class Ran:
     output: str  # its stdout
     date: str  # as 2026-01-31
     made_with: str  # versions of the libraries, and the machine
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A figure of measurements.json."""
+
+    figure: str  # Markdown
+    date: str  # when its first command ran
+    made_with: str  # versions of the libraries, and the machine
+    by_hand: bool  # whether it was entered by hand
+    readme: str = ""  # README's shorter figure, if it has one
 
 
 def ran(command: str) -> Ran:
@@ -63,35 +73,43 @@ def ran(command: str) -> Ran:
     return found
 
 
-def measured(measurement: Measurement) -> dict[str, Any]:
-    """The entry of a measurement: its commands run, its figure read from what they left.
+def measured(measurement: Measurement) -> Entry:
+    """The figure of a measurement: its commands run, what they left read.
 
     Raises:
         UserError: a command ended with an error, or what it left is not complete.
+        ValueError: a figure that is entered by hand.
     """
+    if measurement.figure is None:
+        raise ValueError(f"{measurement.name} is entered by hand")
     commands = [ran(command) for command in measurement.commands]
     results, oldest = Results(Path(OUT), tuple(done.output for done in commands)), min(commands, key=lambda r: r.date)
-    figures = {"figure": measurement.figure(results)}
-    if measurement.readme is not None:
-        figures["readme"] = measurement.readme(results)
-    return figures | {"date": oldest.date, "made_with": oldest.made_with, "by_hand": False}
+    readme = measurement.readme(results) if measurement.readme else ""
+    return Entry(measurement.figure(results), oldest.date, oldest.made_with, False, readme)
 
 
-def read(path: Path) -> dict[str, dict[str, Any]]:
+def read(path: Path) -> dict[str, Entry]:
     """The entries of all measurements by name; none where there is no file yet."""
-    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    entries = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    return {name: Entry(**entry) for name, entry in entries.items()}
+
+
+def write(path: Path, entries: dict[str, Entry]) -> None:
+    """Write the entries in the order of the list."""
+    order = [measurement.name for measurement in MEASUREMENTS if measurement.name in entries]
+    write_text(path, json.dumps({name: asdict(entries[name]) for name in order}, indent=2, ensure_ascii=False) + "\n")
 
 
 def page() -> str:
     """The table of all figures, and what they were made with, as Markdown."""
     entries, titles = read(FIGURES), ("what", "figure", "measured", "command")
-    made_with = list(dict.fromkeys(entry["made_with"] for entry in entries.values()))
+    made_with = list(dict.fromkeys(entry.made_with for entry in entries.values()))
     rows = []
     for measurement in MEASUREMENTS:
         entry = entries[measurement.name]
-        when = f"{entry['date']}{', by hand' if entry['by_hand'] else ''} ({made_with.index(entry['made_with']) + 1})"
+        when = f"{entry.date}{', by hand' if entry.by_hand else ''} ({made_with.index(entry.made_with) + 1})"
         commands = "<br>".join(f"`{command}`" for command in measurement.commands)
-        rows.append((measurement.what, entry["figure"], when, commands))
+        rows.append((measurement.what, entry.figure, when, commands))
     machines = "".join(f"{number}. {text}\n" for number, text in enumerate(made_with, start=1))
     return f"{table(titles, rows)}\nThe number behind a date tells what it was made with:\n\n{machines}"
 
@@ -132,15 +150,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(f"error: {measurement.name}: {error}", file=sys.stderr)
             code = 1
             continue
-        print(f"{measurement.name}: {entry['figure']}", flush=True)
+        print(f"{measurement.name}: {entry.figure}", flush=True)
         write(FIGURES, {**read(FIGURES), measurement.name: entry})
     return code
-
-
-def write(path: Path, entries: dict[str, dict[str, Any]]) -> None:
-    """Write the entries in the order of the list."""
-    order = [measurement.name for measurement in MEASUREMENTS if measurement.name in entries]
-    write_text(path, json.dumps({name: entries[name] for name in order}, indent=2, ensure_ascii=False) + "\n")
 
 
 if __name__ == "__main__":

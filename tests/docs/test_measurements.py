@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import asdict
 
 import pytest
 
@@ -33,9 +34,9 @@ def test_every_row_has_an_entry_and_stands_on_the_page():
     lines = measurements.page().splitlines()
     for measurement in MEASUREMENTS:
         entry = entries[measurement.name]
-        assert entry["by_hand"] or measurement.figure
+        assert entry.by_hand or measurement.figure
         (line,) = (line for line in lines if line.startswith(f"| {measurement.what} |"))
-        assert entry["figure"] in line
+        assert entry.figure in line
         assert all(f"`{command}`" in line for command in measurement.commands)
 
 
@@ -44,13 +45,14 @@ def test_readme_tells_the_measured_figures():
     part = (ROOT / "README.md").read_text().partition("## How accurate")[2].partition("\n## ")[0]
     told = re.findall(r"^\| .* \| (.*) \|$", part, flags=re.M)[1:]
     assert len(told) == 5
-    assert told == [entry["readme"] for entry in entries if "readme" in entry]
+    assert told == [entry.readme for entry in entries if entry.readme]
 
 
 def corners(results):
     return f"{rms(pooled(results.points('smoke')[0])):.4f} px, {results.outputs[1].split()[0]}"
 
 
+BY_HAND = measurements.Entry("7", "2026-01-31", "by heart", True)
 SMOKE = Measurement("smoke", "corners", (f"{RUN}run smoke --out {OUT}/smoke --quiet", f"{RUN}recipes"), corners)
 
 
@@ -61,7 +63,7 @@ def place(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(measurements, "MEASUREMENTS", (SMOKE, by_hand))
     monkeypatch.setattr(measurements, "FIGURES", tmp_path / "measurements.json")
-    (tmp_path / "measurements.json").write_text('{"other": {"figure": "7", "made_with": "", "by_hand": true}}')
+    (tmp_path / "measurements.json").write_text(json.dumps({"other": asdict(BY_HAND)}))
     return tmp_path
 
 
@@ -69,7 +71,7 @@ def test_a_figure_is_measured_and_what_is_there_is_kept(place, capfd):
     assert measurements.main([]) == 0
     entries = json.loads((place / "measurements.json").read_text())
     assert list(entries) == ["smoke", "other"]
-    assert entries["other"]["figure"] == "7"
+    assert entries["other"] == asdict(BY_HAND)
     found = re.fullmatch(r"(\d\.\d{4}) px, name", entries["smoke"]["figure"])
     # Six small frames: 0.003 to 0.006 px through each lens.
     assert found
