@@ -7,6 +7,7 @@ from dataclasses import asdict
 import pytest
 
 from tests.docs.documents import ROOT, RUN, wrong_options
+from tools import measurement_figures as figures
 from tools import measurements
 from tools.measurement_list import MEASUREMENTS, OUT, Measurement
 from tools.measurement_results import Results, pooled, rms, span
@@ -67,7 +68,7 @@ def place(tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_a_figure_is_measured_and_what_is_there_is_kept(place, capfd):
+def test_a_figure_is_measured_beside_one_by_hand(place):
     assert measurements.main([]) == 0
     entries = json.loads((place / "measurements.json").read_text())
     assert list(entries) == ["smoke", "other"]
@@ -80,12 +81,17 @@ def test_a_figure_is_measured_and_what_is_there_is_kept(place, capfd):
     assert "mitsuba 3.9" in entries["smoke"]["made_with"]
     assert not entries["smoke"]["by_hand"]
 
-    first = capfd.readouterr().out
-    assert measurements.main(["--only", "smoke"]) == 0
-    again = capfd.readouterr().out
-    assert SMOKE.commands[0] in first
-    assert SMOKE.commands[0] not in again
-    assert json.loads((place / "measurements.json").read_text()) == entries
+
+def test_a_command_that_has_run_is_not_run_again(place, capfd, monkeypatch):
+    quick = Measurement("other", "the first word", (f"{RUN}recipes",), lambda results: results.outputs[0].split()[0])
+    monkeypatch.setattr(measurements, "MEASUREMENTS", (quick,))
+    printed = []
+    for _ in range(2):
+        assert measurements.main(["--only", "other"]) == 0
+        printed.append(capfd.readouterr().out)
+        assert measurements.read(measurements.FIGURES)["other"].figure == "name"
+    assert quick.commands[0] in printed[0]
+    assert quick.commands[0] not in printed[1]
 
 
 def test_a_command_that_fails_keeps_the_figure_that_was_there(place, capfd, monkeypatch):
@@ -128,3 +134,53 @@ def test_a_table_of_the_papers_page_is_read_by_its_heading(tmp_path):
 def test_a_span_is_one_number_where_its_ends_read_alike():
     assert span([0.0041, 0.0179], ".3f") == "0.004 to 0.018"
     assert span([0.0041, 0.0044], ".3f") == "0.004"
+
+
+def benchmark(times=(), figures=()):
+    """A benchmark's JSON. times: ours, ours in ms, compared with, ratio. figures: ours, figure, value."""
+    rows = [dict(zip(("ours", "ours_ms", "other", "ratio"), row, strict=True)) for row in times]
+    told = [dict(zip(("ours", "figure", "value"), row, strict=True)) for row in figures]
+    return Results(ROOT, (json.dumps({"times": rows, "figures": told}),) * 2)
+
+
+def test_a_benchmarks_ratios_are_told():
+    rays = "64 primary rays"
+    lenses = {"perspective": 73.0, "stereographic": 26.2, "equidistance": 30.0, "equisolid": 31.0, "orthogonal": 36.8}
+    times = [(f"{lens}: render, 4 samples", 7.0, rays, ratio) for lens, ratio in lenses.items()]
+    together = ("one render of each camera", 7.0, rays, 40.0)
+    assert (
+        figures.rendering(benchmark([*times, together])) == "26 to 37 times faster (fish-eyes), 73 times (perspective)"
+    )
+    all_stages, one = ("all stages, a frame", 100.0, rays, 4.0), ("of which detect", 10.0, rays, 40.0)
+    assert figures.stages(benchmark([all_stages, one])) == "0.25 of their time in `clean`, 0.25 in `typical`"
+
+
+def test_solvers_are_told_by_their_batches():
+    loops = ("PoseLib p3p on given rays, in a loop", "PoseLib p3p and its rays, in a loop")
+    batches = {"solve best": 1e-3, "solve eposit": 5e-4, "gpnpf": 0.15, "pnpfr": 0.2, "opnp": 1.6}
+    times = [
+        (f"{name}, {way}", factor * ms, loop, ratio)
+        for name, ms in batches.items()
+        for way, factor in (("single call", 10.0), ("batch of 100", 1.0))
+        for loop, ratio in zip(loops, (1e-3 / ms / factor, 15e-3 / ms / factor), strict=True)
+    ]
+    told = "1.0 times (`best`), 2.0 times (`eposit`) on given rays; 15 and 30 times where the loop makes its rays"
+    assert figures.solver(benchmark(times)) == told
+    assert figures.compared_solvers(benchmark(times)) == "OPnP 1.6 ms, GPnPf 0.15 ms, PnPfr 0.20 ms; EPOSIT 0.5 µs"
+
+
+@pytest.mark.parametrize(("last", "told"), [("0.0054", "above 3900 times"), ("0.0033", "3900 times")])
+def test_a_ratio_is_a_lower_bound_where_all_samples_did_not_suffice(last, told):
+    errors = [
+        ("orthogonal: corners, ours", "0.0034 px RMS", ""),
+        ("corners, plain script, 64 samples", "0.0090 px RMS", ""),
+        ("corners, plain script, 2048 samples", f"{last} px RMS", ""),
+    ]
+    times = [("frame and detection", 30.0, "full picture, Mitsuba direct, 2048 rays", 3900.4)]
+    whole = f"{told}: ours 0.0034 px RMS, plain pictures {last} px RMS with 2048 samples"
+    assert figures.equal_error(benchmark(times, errors)) == whole
+
+
+def test_memory_is_told_by_its_growth():
+    rows = [("resident after 200 frames", "500 MB", ""), ("resident after 2000 frames", "505 MB", "+4.8 MB")]
+    assert figures.memory(benchmark(figures=rows)) == "5 MB more"
