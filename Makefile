@@ -7,7 +7,7 @@ BLENDER := .venv-blender
 BLENDER_PYTHON ?= $(PYTHON)
 
 .PHONY: help setup demo nightly test test-full check-slow test-oldest test-newest lint types layers layers-picture docs bench \
-	bench-blender wheel lock clean
+	bench-blender measurements wheel lock clean
 
 help:  ## this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 16
@@ -85,6 +85,9 @@ $(BLENDER)/.done:
 	$(BLENDER)/bin/python -m pip install --quiet --disable-pip-version-check --only-binary bpy bpy || \
 		{ echo "bpy has wheels for some Pythons only, as 3.11 and 3.13; set BLENDER_PYTHON=..."; exit 1; }
 	@touch $@
+
+measurements: $(SETUP)  ## the figures of the documents, some twenty minutes; goes on where it stopped; ARGS="--only NAME"
+	$(BIN)/python -m tools.measurements $(ARGS)
 
 wheel: $(SETUP)  ## the library `eposit` as a wheel in dist/
 	$(BIN)/python -m build --wheel --no-isolation

@@ -1,4 +1,7 @@
-"""Sphinx settings. Reference pages and the picture of the layers are written from the code when the pages are built."""
+"""Sphinx settings.
+
+Reference pages, the table of measurements and the picture of the layers are written when the pages are built.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ from sphinx.application import Sphinx
 DOCS = Path(__file__).resolve().parent
 sys.path.insert(0, str(DOCS.parent))
 
-from tools import layers, reference  # noqa: E402
+from tools import layers, measurements, reference  # noqa: E402
 
 project = "EPOSIT"
 author = "The EPOSIT pipeline's maintainers"
@@ -38,6 +41,7 @@ MADE = {
     "library": reference.library,
     "history": reference.history,
     "baselines": reference.baselines,
+    "measurements": measurements.page,
 }
 
 

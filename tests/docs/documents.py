@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from pathlib import Path
 
 from pipelines.cli import all_commands
@@ -35,6 +36,14 @@ def commands():
 def named(words):
     """Name of the command that words behind `python -m pipelines` run: the first word, or two if it is of a group."""
     return next(name for name in (words[0], " ".join(words[:2])) if name in COMMANDS)
+
+
+def wrong_options(line):
+    """Options of a line behind `python -m pipelines` that its command does not have."""
+    words = shlex.split(line, comments=True)
+    command = COMMANDS[named(words)]
+    known = {option for parameter in command.params for option in (*parameter.opts, *parameter.secondary_opts)}
+    return {word for word in words if word.startswith("-")} - known
 
 
 def programs():

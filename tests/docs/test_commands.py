@@ -11,7 +11,7 @@ import pytest
 
 from pipelines.nightly.history import History
 from pipelines.nightly.other_code import digest_of
-from tests.docs.documents import COMMANDS, ROOT, commands, named
+from tests.docs.documents import COMMANDS, ROOT, commands, named, wrong_options
 from tests.pipelines.nightly import simulated
 from tests.pipelines.nightly.whole_nights import results
 
@@ -24,10 +24,7 @@ OF_HISTORY = {"nightly accept", "nightly explain", "nightly report"}
 
 @pytest.mark.parametrize(("document", "line"), LINES)
 def test_command_and_options_exist(document, line):
-    words = shlex.split(line, comments=True)
-    command = COMMANDS[named(words)]
-    known = {option for parameter in command.params for option in (*parameter.opts, *parameter.secondary_opts)}
-    assert {word for word in words if word.startswith("-")} <= known, f"{document}: {line}"
+    assert wrong_options(line) == set(), f"{document}: {line}"
 
 
 def test_every_command_has_a_line_in_the_guide():
