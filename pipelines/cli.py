@@ -7,8 +7,8 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-import click
 import typer
+import typer.core
 import typer.main
 
 from datasets.errors import UserError
@@ -70,9 +70,9 @@ def _add(app: typer.Typer, commands: tuple[tuple[Callable[..., None], str], ...]
         app.command(epilog=EXAMPLE.format(example))(command)
 
 
-def all_commands() -> dict[str, click.Command]:
+def all_commands() -> dict[str, typer.core.TyperCommand]:
     """Every command by its name; those of a group by both names."""
-    found: dict[str, click.Command] = {}
+    found: dict[str, typer.core.TyperCommand] = {}
     for name, command in typer.main.get_command(app).commands.items():  # pyright: ignore[reportAttributeAccessIssue]
         own = getattr(command, "commands", {})
         found |= {f"{name} {inner}": item for inner, item in own.items()} or {name: command}

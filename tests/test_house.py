@@ -54,9 +54,6 @@ def test_every_command_has_help_and_an_example(name):
 # Functions that may be longer than 60 lines, and why.
 LONG = {
     "solve": "half of it is the contract that users read",
-    "_fit_all": "a compiled loop: parts that it called would be compiled once more each, and NumPy's are not allowed",
-    "_precision_claims": "a list of claims, one entry after the other",
-    "_principal_claims": "a list of claims, one entry after the other",
 }
 
 

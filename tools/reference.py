@@ -7,8 +7,8 @@ import inspect
 from collections.abc import Iterable
 from typing import get_type_hints
 
-import click
 import pyarrow as pa
+import typer.core
 
 import eposit
 from datasets.recipe.model import describe, load_recipe, recipe_names
@@ -38,7 +38,7 @@ def commands() -> str:
     return "\n".join(_command(name, command) for name, command in all_commands().items())
 
 
-def _command(name: str, command: click.Command) -> str:
+def _command(name: str, command: typer.core.TyperCommand) -> str:
     rows = []
     for parameter in command.params:  # pyright: ignore[reportAttributeAccessIssue]
         if parameter.param_type_name == "argument":
