@@ -68,6 +68,7 @@ def place(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.full
 def test_a_figure_is_measured_beside_one_by_hand(place):
     assert measurements.main([]) == 0
     entries = json.loads((place / "measurements.json").read_text())

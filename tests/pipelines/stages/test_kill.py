@@ -119,6 +119,7 @@ def assert_equal(root, source, content):
     assert list(root.rglob(".tmp-*")) == []
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("stage", STAGES)
 def test_a_run_killed_in_a_stage_is_resumed(stage, finished, tmp_path, cli, content):
     recipe, source, _ = finished
