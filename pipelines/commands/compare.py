@@ -52,7 +52,7 @@ def compare(old: Old, new: New, alpha: Alpha = 0.01, json: o.Json = False) -> No
 
 
 def _is_worse(found: Judgement) -> bool:
-    return found.new_failures > 0 or any(item.verdict == "worse" for item in found.findings)
+    return found.new_failures > 0 or bool(found.lost) or any(item.verdict == "worse" for item in found.findings)
 
 
 def _print(found: Judgement, alpha: float) -> None:
@@ -66,6 +66,8 @@ def _print(found: Judgement, alpha: float) -> None:
     for item in found.failures:
         if item.new:
             typer.echo(_failure_line(item))
+    if found.lost:
+        typer.echo(f"no longer there, which is worse: {', '.join(found.lost)}")
     for names, side in ((found.only_old, "NEW"), (found.only_new, "OLD")):
         if names:
             typer.echo(f"not in {side}, so not compared: {', '.join(names)}")
@@ -104,6 +106,7 @@ def _as_json(found: Judgement, alpha: float) -> dict[str, Any]:
         "identical": found.identical,
         "paired": found.paired,
         "alpha": alpha,
+        "lost": found.lost,
         "only_old": found.only_old,
         "only_new": found.only_new,
         "failures": [

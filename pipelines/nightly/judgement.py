@@ -27,7 +27,10 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Failures:
-    """Frames of one slice that have a corner, or a pose, on one side only."""
+    """Frames of one slice that have corners, a pose, or one of a metric's numbers on one side only.
+
+    A number that is gone counts: without it, means over what is left would flatter the candidate.
+    """
 
     slice: str
     frames: int
@@ -49,6 +52,7 @@ class Judgement:
     failures: tuple[Failures, ...]
     paired: bool  # the same frames on both sides
     identical: bool  # and the same numbers in all of them
+    lost: tuple[str, ...]  # slice and metric that the baseline has in some frame and the candidate in none
     only_old: tuple[str, ...]  # slices that one side lacks
     only_new: tuple[str, ...]
 
@@ -75,9 +79,12 @@ def judge(old: pa.Table, new: pa.Table, alpha: float, paired: bool) -> Judgement
     meant = verdicts([change for _, change in found], alpha)
     findings = tuple(Finding(name, change, verdict) for (name, change), verdict in zip(found, meant, strict=True))
     failures = tuple(_failures(before[name], after[name]) for name in common) if paired else ()
+    lost = tuple(
+        f"{name} {metric}" for name in common for metric in before[name].values if metric not in after[name].values
+    )
     only = [tuple(name for name in one if name not in other) for one, other in ((before, after), (after, before))]
     identical = paired and not any(only) and all(_same(before[name], after[name]) for name in common)
-    return Judgement(findings, failures, paired, identical, *only)
+    return Judgement(findings, failures, paired, identical, lost, *only)
 
 
 def _changes(old: Slice, new: Slice, paired: bool) -> Iterator[Change]:
@@ -97,7 +104,11 @@ def _changes(old: Slice, new: Slice, paired: bool) -> Iterator[Change]:
 def _failures(old: Slice, new: Slice) -> Failures:
     frames, of_old, of_new = np.intersect1d(old.frame_id, new.frame_id, return_indices=True)
     before, after = old.failed[of_old], new.failed[of_new]
-    return Failures(new.name, len(frames), _ids(frames, after & ~before), _ids(frames, before & ~after))
+    gone, come = after & ~before, before & ~after
+    for name in old.values.keys() | new.values.keys():
+        has, has_now = (side.has(name)[of] for side, of in ((old, of_old), (new, of_new)))
+        gone, come = gone | (has & ~has_now), come | (has_now & ~has)
+    return Failures(new.name, len(frames), _ids(frames, gone), _ids(frames, come & ~gone))
 
 
 def _ids(frames: NDArray[np.int64], chosen: Mask) -> tuple[int, ...]:

@@ -49,6 +49,10 @@ class Slice:
         """As shown and as `explain` takes it."""
         return f"{self.regime}/{self.camera}/{self.system}"
 
+    def has(self, metric: str) -> Mask:
+        """(f,) whether a frame has a metric."""
+        return np.isfinite(self.values[metric]) if metric in self.values else np.zeros(len(self.frame_id), bool)
+
     def by_pose(self, metric: str, poses: NDArray[np.int64]) -> Array:
         """(p,) mean of a metric over the frames of each of `poses`, which are sorted; NaN where none has it."""
         values = self.values[metric]

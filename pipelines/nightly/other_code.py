@@ -21,6 +21,7 @@ from datasets.store.atomic import own_name
 PACKAGES = ("eposit", "render", "datasets", "pipelines")
 KEPT = (".py", ".toml", ".html", ".json", ".typed")
 ROOT = Path(__file__).resolve().parents[2]
+LIMIT_S = 3600.0  # a suite takes minutes; code that hangs must not keep a night from its end
 LAST_LINES = 3  # of what a failed process said
 
 # argv: the folder of the code, the packages that it must hold, then what the program wants.
@@ -73,13 +74,13 @@ class Code:
             OtherCodeError: one failed, or another `eposit` answered.
         """
         words = json.dumps([[str(word) for word in command] for command in commands])
-        done = subprocess.run(
-            [sys.executable, "-c", RUN_COMMANDS, str(self.folder), ",".join(self.packages), words],
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        command = [sys.executable, "-c", RUN_COMMANDS, str(self.folder), ",".join(self.packages), words]
+        try:
+            done = subprocess.run(
+                command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False, timeout=LIMIT_S
+            )
+        except subprocess.TimeoutExpired:
+            raise OtherCodeError(f"code in {self.folder} did not end within {LIMIT_S:g} s") from None
         if done.returncode:
             said = " ".join((done.stderr or done.stdout).strip().splitlines()[-LAST_LINES:])
             names = ", ".join(dict.fromkeys(str(command[0]) for command in commands))

@@ -22,6 +22,9 @@ def judge(found: Judgement, waived: Waived) -> Outcome:
     worse, unproved, better = (found.of(v) for v in (Verdict.WORSE, Verdict.UNPROVED, Verdict.BETTER))
     if worse:
         return failed(GATE, worse, waived)
+    if found.only_old:
+        told = f"not read tonight, though the baseline has them: {', '.join(found.only_old)}"
+        return Outcome(GATE, State.WARNED, told, findings=tuple(unproved))
     if unproved:
         told = f"{len(unproved)} of {len(found.findings)} metrics are neither shown to be worse nor to be equal"
         return Outcome(GATE, State.WARNED, told, findings=tuple(unproved))

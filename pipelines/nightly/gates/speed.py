@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,7 +18,7 @@ from typing import IO
 
 import numpy as np
 
-from pipelines.nightly.other_code import CHOOSE_CODE, Code, OtherCodeError
+from pipelines.nightly.other_code import CHOOSE_CODE, LIMIT_S, Code, OtherCodeError
 from pipelines.nightly.record import Exit, Outcome, State, Timing
 
 GATE = "speed"
@@ -101,9 +102,12 @@ def _running(code: Code, folder: Path) -> Iterator[subprocess.Popen[str]]:
     with subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
+        limit = threading.Timer(LIMIT_S, process.kill)  # whoever waits for an answer then gets the end of the file
+        limit.start()
         try:
             yield process
         finally:
+            limit.cancel()
             process.kill()
 
 

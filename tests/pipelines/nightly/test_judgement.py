@@ -75,3 +75,18 @@ def test_slices_of_one_side_only_are_told():
     assert {name.split("/")[1] for name in found.only_old} == {"orthogonal"}
     assert not found.only_new
     assert not found.identical
+
+
+@pytest.mark.parametrize("metric", ["corner_nees", "circle_x"])
+def test_a_number_that_is_gone_is_a_failure_and_not_left_out(metric):
+    """Without stated covariances, or without the circle, nothing else gets worse: means are over what is left."""
+    night = simulated.night(10, np.random.default_rng(4))
+    values = night[metric].to_numpy(zero_copy_only=False).copy()
+    some, column = values.copy(), night.schema.get_field_index(metric)
+    some[[2, 5]] = np.nan
+    for kept, frames, lost in ((some, {2, 5}, 0), (np.full_like(values, np.nan), set(range(10)), 5)):
+        cut = night.set_column(column, metric, pa.array(kept, mask=np.isnan(kept)))
+        found = judge(night, cut, ALPHA, paired=True)
+        assert {frame for item in found.failures for frame in item.new} == frames
+        assert len(found.lost) == lost
+        assert judge(cut, night, ALPHA, paired=True).new_failures == 0
