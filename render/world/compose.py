@@ -23,7 +23,7 @@ from render.world.room import room
 from render.world.shapes import Objects
 from render.world.studio import studio
 from render.world.things import clutter, occluders, other_boards
-from render.world.user_scene import user_objects, world_from_obj
+from render.world.user_scene import user_scene, world_from_obj
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,7 @@ class Composition:
     objects: Objects  # name to Mitsuba description or object, in the scene's frame; without an integrator
     world_from_obj: Array  # (4, 4) from the object frame, mm, to the scene's frame and units; else the identity
     shows_emitters: bool  # whether the camera sees lamps, sky and environment
+    has_medium: bool = False  # whether there is fog or the like
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +57,7 @@ def compose(world: World, draw: WorldDraw, target: Chessboard, light: Light, par
         SceneFileError: the user's scene cannot be used.
     """
     objects = _surroundings(world, draw, target, light)
+    has_medium = world.surround == "scene" and user_scene(Path(world.file)).has_medium
     objects |= clutter(draw.clutter, target, _rng(draw, 1))
     objects |= other_boards(draw.boards, target, _rng(draw, 2))
     if parts.has_occluders:
@@ -67,7 +69,7 @@ def compose(world: World, draw: WorldDraw, target: Chessboard, light: Light, par
     if world.surround in ("room", "sky") and draw.has_target:
         objects |= stand_shapes(target, world.floor_mm)
     matrix = world_from_obj(world, target) if world.surround == "scene" else np.eye(4)
-    return Composition(_in_scene(objects, matrix), matrix, world.surround != "studio")
+    return Composition(_in_scene(objects, matrix), matrix, world.surround != "studio", has_medium)
 
 
 @functools.lru_cache(maxsize=2)
@@ -101,7 +103,7 @@ def _surroundings(world: World, draw: WorldDraw, target: Chessboard, light: Ligh
         return sky(world, draw, target, _rng(draw, 0))
     if world.surround == "envmap":
         return environment(world, draw)
-    return dict(user_objects(Path(world.file)))
+    return dict(user_scene(Path(world.file)).objects)
 
 
 def _rng(draw: WorldDraw, group: int) -> np.random.Generator:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,13 +12,21 @@ from eposit.arrays import Array
 from render import backend
 from render.targets.chessboard import Chessboard
 from render.world.description import World
-from render.world.scene_file import SceneFile, SceneFileError, read_scene_file
+from render.world.scene_file import SceneFileError, read_scene_file
 from render.world.shapes import Objects
 
 
+@dataclass(frozen=True)
+class UserScene:
+    """The shapes and emitters of a scene file, loaded; its integrator and sensors are left out."""
+
+    objects: Objects
+    has_medium: bool  # whether there is fog or the like, which needs another path tracer
+
+
 @functools.lru_cache(maxsize=2)
-def user_objects(path: Path) -> Objects:
-    """The shapes and emitters of a scene file, loaded; its integrator and sensors are left out.
+def user_scene(path: Path) -> UserScene:
+    """Load a scene file.
 
     Raises:
         SceneFileError: the file cannot be used; Mitsuba does not know a plugin or refuses a value.
@@ -34,12 +43,7 @@ def user_objects(path: Path) -> Objects:
     objects |= {f"scene_light_{i}": light for i, light in enumerate(apart)}
     if not scene.emitters():
         raise SceneFileError(f"{path} has no light; add an emitter to the scene")
-    return objects
-
-
-def has_medium(scene_file: SceneFile) -> bool:
-    """Whether a scene has a participating medium, which needs another path tracer."""
-    return "<medium" in scene_file.text
+    return UserScene(objects, "<medium" in scene_file.text)
 
 
 def world_from_obj(world: World, target: Chessboard) -> Array:
