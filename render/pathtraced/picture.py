@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from eposit import Camera, Pose
 from render import backend
+from render.colour import luminance
 from render.light import Light
 from render.pathtraced.tiles import Film, Tracer, trace_region
 from render.targets.chessboard import Chessboard
@@ -46,10 +47,25 @@ def trace_picture(
     def samples(tile: Region) -> int:
         return world.path_samples if _overlap(tile, near) else world.background_samples
 
-    tracer = tracer_of(world, draw, target, light)
+    tracer, gain = prepared(world, draw, target, light)
     film = trace_region(tracer, view.camera, view.cam_from_obj, region, samples, view.seed)
-    film[..., :3] *= np.float32(metered_gain(world, draw, target, light))
+    film[..., :3] *= np.float32(gain)
     return film
+
+
+@functools.lru_cache(maxsize=1)
+def prepared(world: World, draw: WorldDraw, target: Chessboard, light: Light) -> tuple[Tracer, float]:
+    """A world's scene with its path tracer, and what its radiance is multiplied with.
+
+    The scene before this one is freed first, and so is the one with the card: Dr.Jit numbers what is alive, and only
+    where worlds of one kind are numbered alike a kernel serves them all.
+
+    Raises:
+        ValueError: no light reaches the target, or the user's scene cannot be used.
+    """
+    prepared.cache_clear()
+    gain = metered_gain(world, draw, target, light)
+    return tracer_of(world, draw, target, light), gain
 
 
 def tracer_of(world: World, draw: WorldDraw, target: Chessboard, light: Light, parts: Parts = WHOLE) -> Tracer:
@@ -60,7 +76,6 @@ def tracer_of(world: World, draw: WorldDraw, target: Chessboard, light: Light, p
     return Tracer(scene, backend.load().load_dict(settings), composition.world_from_obj)
 
 
-@functools.lru_cache(maxsize=64)
 def metered_gain(world: World, draw: WorldDraw, target: Chessboard, light: Light) -> float:
     """What radiance in a world is multiplied with, so that 1 is a matt white card in the target's place, on the mean.
 
@@ -71,8 +86,7 @@ def metered_gain(world: World, draw: WorldDraw, target: Chessboard, light: Light
     """
     if world.surround == "studio":
         return 1.0
-    tracer = tracer_of(world, draw, target, light, CARD)
-    mean = float(np.mean(_card_radiance(tracer, target)))
+    mean = float(np.mean(luminance(_card_radiance(tracer_of(world, draw, target, light, CARD), target))))
     if not mean > 0.0:
         raise ValueError("no light reaches the target's front; turn it to the light or move it")
     return 1.0 / mean

@@ -72,7 +72,6 @@ def compose(world: World, draw: WorldDraw, target: Chessboard, light: Light, par
     return Composition(_in_scene(objects, matrix), matrix, world.surround != "studio", has_medium)
 
 
-@functools.lru_cache(maxsize=2)
 def load_scene(
     world: World, draw: WorldDraw, target: Chessboard, light: Light, parts: Parts = WHOLE
 ) -> tuple[DeviceScene, Composition]:
