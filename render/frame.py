@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from eposit import Camera, Pose
+from eposit.arrays import Mask
 from render import backend
 from render.analytic.image_circle import lens_coverage
 from render.analytic.integrate import integrate_region
@@ -18,12 +19,16 @@ from render.colour import luminance
 from render.device import DeviceScene
 from render.light import Light
 from render.pathtraced.fisheye import sensor_dict
-from render.pathtraced.picture import Viewpoint, trace_picture
+from render.pathtraced.picture import Viewpoint, prepared, trace_picture
 from render.pathtraced.scene import reference_scene
 from render.region import Image, target_region
 from render.targets.chessboard import Chessboard
 from render.targets.image_region import Region
+from render.truth.pixels import PixelTruth, pixel_truth
+from render.truth.visibility import visible_points
 from render.world import World, WorldDraw
+from render.world.boards import BOARD
+from render.world.compose import Composition
 
 REFERENCE_RAYS = 1 << 24  # in flight while the reference is traced
 
@@ -78,6 +83,40 @@ def render_world(
     film = trace_picture(world, draw, target, light, view, near, whole)
     picture = _grey_or_colour(film[..., :3], in_colour)
     return LinearImage(picture[near.pixels], near, picture)
+
+
+@dataclass(frozen=True, slots=True)
+class FrameTruth:
+    """Truth of one frame, traced when it is asked for."""
+
+    scene: DeviceScene
+    composition: Composition
+    target: Chessboard
+    camera: Camera
+    cam_from_obj: Pose
+
+    def visible(self) -> Mask:
+        """(n,) whether the camera sees each point of the target."""
+        has_target = BOARD in self.composition.objects
+        place = self.composition.world_from_obj, self.target.points, self.camera, self.cam_from_obj
+        return visible_points(self.scene, *place, has_target=has_target)
+
+    def pixels(self) -> PixelTruth:
+        """Depth, range, normal and object of every pixel."""
+        place = self.composition.world_from_obj, tuple(self.composition.objects), self.camera, self.cam_from_obj
+        return pixel_truth(self.scene, *place)
+
+
+def truth_of(
+    world: World, draw: WorldDraw, target: Chessboard, light: Light, camera: Camera, cam_from_obj: Pose
+) -> FrameTruth:
+    """The truth of one frame, by rays in the scene that its picture shows.
+
+    Raises:
+        ValueError: no light reaches the target, or the user's file cannot be used.
+    """
+    tracer, _ = prepared(world, draw, target, light)
+    return FrameTruth(tracer.scene, tracer.composition, target, camera, cam_from_obj)
 
 
 def _grey_or_colour(rgb: Image, in_colour: bool) -> Image:

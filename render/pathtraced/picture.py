@@ -73,7 +73,7 @@ def tracer_of(world: World, draw: WorldDraw, target: Chessboard, light: Light, p
     scene, composition = load_scene(world, draw, target, light, parts)
     kind = "volpath" if composition.has_medium else "path"
     settings = {"type": kind, "max_depth": world.path_depth, "hide_emitters": not composition.shows_emitters}
-    return Tracer(scene, backend.load().load_dict(settings), composition.world_from_obj)
+    return Tracer(scene, backend.load().load_dict(settings), composition)
 
 
 def metered_gain(world: World, draw: WorldDraw, target: Chessboard, light: Light) -> float:
@@ -98,8 +98,10 @@ def _card_radiance(tracer: Tracer, target: Chessboard) -> NDArray[np.float32]:
     x0, x1, y0, y1 = target.extent_mm
     inner = (np.arange(METER_POINTS) + 0.5) / METER_POINTS
     x, y = (grid.ravel() for grid in np.meshgrid(x0 + (x1 - x0) * inner, y0 + (y1 - y0) * inner))
-    points = np.column_stack((x, y, np.full(x.size, -CARD_GAP_MM), np.ones(x.size))) @ tracer.world_from_obj.T
-    inwards = tracer.world_from_obj[:3, 2] / np.linalg.norm(tracer.world_from_obj[:3, 2])
+    points = (
+        np.column_stack((x, y, np.full(x.size, -CARD_GAP_MM), np.ones(x.size))) @ tracer.composition.world_from_obj.T
+    )
+    inwards = tracer.composition.world_from_obj[:3, 2] / np.linalg.norm(tracer.composition.world_from_obj[:3, 2])
     origins = np.repeat(points[:, :3], METER_RAYS, axis=0).astype(np.float32)
     sampler = mi.load_dict({"type": "independent", "sample_count": 1})
     sampler.seed(METER_SEED, len(origins))

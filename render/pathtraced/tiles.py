@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eposit import Camera, Pose
-from eposit.arrays import Array
 from render import backend
 from render.pathtraced.fisheye import tile_sensor
 from render.targets.image_region import Region
+from render.world.compose import Composition
 
 TILE = 128  # px along a side
 Film = NDArray[np.float32]  # (height, width, 4) linear RGB and share of hits
@@ -30,7 +30,7 @@ class Tracer:
 
     scene: Any
     integrator: Any
-    world_from_obj: Array  # (4, 4)
+    composition: Composition
 
 
 def trace_region(
@@ -61,7 +61,7 @@ def tiles_of(region: Region) -> Iterator[Region]:
 def trace_tile(tracer: Tracer, camera: Camera, cam_from_obj: Pose, tile: Region, samples: int, seed: int) -> Film:
     """(TILE, TILE, 4) film of one tile."""
     dr = backend.jit()
-    sensor = tile_sensor(camera, cam_from_obj, tile, samples, tracer.world_from_obj)
+    sensor = tile_sensor(camera, cam_from_obj, tile, samples, tracer.composition.world_from_obj)
     with dr.suspend_grad():
         film = tracer.integrator.render(tracer.scene, sensor, seed=tile_seed(seed, tile), spp=0)
     return np.array(film)

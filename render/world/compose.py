@@ -17,13 +17,15 @@ from render.targets.chessboard import Chessboard
 from render.world.boards import card_shapes, stand_shapes, target_shapes
 from render.world.description import World
 from render.world.draw import WorldDraw
+from render.world.files import require_unchanged
 from render.world.materials import Material, surface
 from render.world.open_air import environment, sky
 from render.world.room import room
+from render.world.scene_file import SceneFileError
 from render.world.shapes import Objects
 from render.world.studio import studio
 from render.world.things import clutter, occluders, other_boards
-from render.world.user_scene import user_scene, world_from_obj
+from render.world.user_scene import first_line, user_scene, world_from_obj
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ def compose(world: World, draw: WorldDraw, target: Chessboard, light: Light, par
     of one does not move the others.
 
     Raises:
-        SceneFileError: the user's scene cannot be used.
+        SceneFileError: the user's file cannot be used, or has changed.
     """
     objects = _surroundings(world, draw, target, light)
     has_medium = world.surround == "scene" and user_scene(Path(world.file)).has_medium
@@ -81,12 +83,20 @@ def load_scene(
         SceneFileError: the user's scene cannot be used.
     """
     composition = compose(world, draw, target, light, parts)
-    return backend.load().load_dict({"type": "scene", **composition.objects}), composition
+    return _loaded(composition.objects), composition
 
 
 def load_objects(objects: Objects) -> DeviceScene:
     """A scene of objects in the object frame."""
-    return backend.load().load_dict({"type": "scene", **_in_scene(objects, np.eye(4))})
+    return _loaded(_in_scene(objects, np.eye(4)))
+
+
+def _loaded(objects: Objects) -> DeviceScene:
+    try:
+        # Not optimised: Mitsuba would merge meshes, and each object has an id of its own.
+        return backend.load().load_dict({"type": "scene", **objects}, optimize=False)
+    except RuntimeError as error:  # of a file that a plugin cannot read, such as an environment map
+        raise SceneFileError(f"Mitsuba cannot load the world: {first_line(error)}; mend the file") from None
 
 
 def _coat(world: World, draw: WorldDraw, reflectance: Material) -> Material:
@@ -100,6 +110,7 @@ def _surroundings(world: World, draw: WorldDraw, target: Chessboard, light: Ligh
         return room(world, draw, target, _rng(draw, 0))
     if world.surround == "sky":
         return sky(world, draw, target, _rng(draw, 0))
+    require_unchanged(Path(world.file), world.file_sha256)
     if world.surround == "envmap":
         return environment(world, draw)
     return dict(user_scene(Path(world.file)).objects)

@@ -33,12 +33,16 @@ def user_scene(path: Path) -> UserScene:
     """
     mi, scene_file = backend.load(), read_scene_file(path)
     try:
-        scene = mi.load_string(scene_file.text)
+        scene = mi.load_string(scene_file.text, optimize=False)
     except Exception as error:  # Mitsuba raises whatever a plugin does
-        raise SceneFileError(f"Mitsuba cannot load {path}: {_first_line(error)}; mend the scene") from None
+        raise SceneFileError(f"Mitsuba cannot load {path}: {first_line(error)}; mend the scene") from None
     if not isinstance(scene, mi.Scene):
         raise SceneFileError(f"{path} is not a Mitsuba scene; give a file with <scene> and shapes in it")
-    objects: Objects = {f"scene_{i}": shape for i, shape in enumerate(scene.shapes())}
+    objects: Objects = {}
+    for i, shape in enumerate(scene.shapes()):
+        name = f"scene_{i}_{shape.id()}".replace(".", "_")  # Mitsuba takes no dots in a name
+        shape.set_id(name)
+        objects[name] = shape
     apart = [light for light in scene.emitters() if not mi.has_flag(light.flags(), mi.EmitterFlags.Surface)]
     objects |= {f"scene_light_{i}": light for i, light in enumerate(apart)}
     if not scene.emitters():
@@ -58,6 +62,7 @@ def world_from_obj(world: World, target: Chessboard) -> Array:
     return matrix
 
 
-def _first_line(error: Exception) -> str:
+def first_line(error: Exception) -> str:
+    """The first line of what Mitsuba says, to stand in a sentence."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     return (lines[0] if lines else type(error).__name__).rstrip(".")
