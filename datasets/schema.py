@@ -167,7 +167,8 @@ SCORES = pa.schema(
             "failure_reason",
             pa.string(),
             "null where the status is ok; for points_missing what detection says of the points that are missing, or "
-            "beyond_lens where true points have no image; else the status",
+            "beyond_lens where true points have no image; hidden where fewer than four points are visible; else the "
+            "status",
         ),
         *_floats(
             {
@@ -191,7 +192,10 @@ SCORES = pa.schema(
             }
         ),
         _field(
-            "gross_failure", pa.bool_(), "the paper's star: no solution, or a translation at least twice the true one"
+            "gross_failure",
+            pa.bool_(),
+            "the paper's star: no solution, or a translation at least twice the true one; where the target is "
+            "hidden: a solution",
         ),
     ]
 )

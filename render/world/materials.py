@@ -77,7 +77,7 @@ def bricks(rng: np.random.Generator) -> Texture:
     """Courses of bricks, each a little different, with mortar between."""
     rows, columns, mortar = 8, 4, 3
     height, width = SIDE // rows, SIDE // columns
-    base = np.array([0.38, 0.15, 0.09]) * rng.uniform(0.8, 1.3)
+    base = np.array([0.42, 0.24, 0.17]) * rng.uniform(0.8, 1.3)
     texture = np.empty((SIDE, SIDE, 3))
     for row in range(rows):
         shades = rng.uniform(0.65, 1.35, (columns, 1)) * base
