@@ -10,7 +10,7 @@ from eposit.arrays import Array
 from render import backend
 from render.targets.chessboard import Chessboard
 from render.world.materials import Material, diffuse
-from render.world.shapes import FRONT, UP, Objects, Shape, box, frame_matrix, pole
+from render.world.shapes import FRONT, RIGHT, UP, Objects, Shape, box, frame_matrix, pole
 
 BOARD, CIRCLE = "board", "circle"
 BACK = (0.3, 0.3, 0.3)  # reflectance of a board's back
@@ -48,14 +48,14 @@ def board_shape(target: Chessboard, coat: Coat) -> Shape:
 def circle_shape(target: Chessboard) -> Shape:
     """The raised disc."""
     radius = target.circle_radius_mm
-    matrix = frame_matrix(*(np.diag([radius, radius, 1.0])), target.circle_centre)
+    matrix = frame_matrix(radius * RIGHT, -radius * UP, -FRONT, target.circle_centre)
     paper = {"type": "diffuse", "reflectance": {"type": "uniform", "value": target.circle}}
     return _facing_camera("disk", matrix, paper)
 
 
 def card_shapes(target: Chessboard) -> Objects:
     """A matt card as white as the board in the board's place, to meter light on."""
-    return {BOARD: board_shape(target, lambda _: diffuse((target.white,) * 3))}
+    return {BOARD: board_shape(target, lambda _: diffuse((target.white, target.white, target.white)))}
 
 
 def stand_shapes(target: Chessboard, floor_mm: float) -> Objects:
