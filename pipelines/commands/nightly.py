@@ -33,8 +33,6 @@ RunName = Annotated[str, typer.Argument(metavar="RUN", help="Run of the history,
 SliceName = Annotated[str, typer.Argument(metavar="SLICE", help="As regime/camera/system.")]
 OfRun = Annotated[str, typer.Option("--run", help="Run of the history.")]
 SuiteName = Annotated[str, typer.Argument(metavar="SUITE", help="As the page names it, for example pinned-typical.")]
-FrameNumber = Annotated[int, typer.Argument(metavar="FRAME", help="Its frame_id in the suite.")]
-Png = Annotated[Path, typer.Option("--out", help="File of the picture.")]
 Reason = Annotated[str, typer.Option(help="Why; it stays in baselines.toml.")]
 Until = Annotated[str | None, typer.Option(metavar="DATE", help="Last day of a waiver, as 2026-05-04.")]
 By = Annotated[str | None, typer.Option(help="Who accepts.  [default: the user's name]")]
@@ -121,19 +119,17 @@ def explain(slice: SliceName, history: HistoryFolder, run: OfRun = "latest", jso
 
 
 def frame(
-    suite: SuiteName, frame_id: FrameNumber, history: HistoryFolder, run: OfRun = "latest", out: Png = Path("frame.png")
+    suite: SuiteName,
+    frame_id: o.FrameNumber,
+    history: HistoryFolder,
+    run: OfRun = "latest",
+    out: o.Png = Path("frame.png"),
 ) -> None:
     """Make one picture of a run again, into a PNG, and tell what this code finds in it."""
-    from datasets.store.images import encode_png
-    from datasets.store.refusals import refused
+    from pipelines.commands.pictures import show
     from pipelines.nightly.one_frame import remake
 
-    found = remake(history, run, suite, frame_id)
-    try:
-        out.write_bytes(encode_png(found.image))
-    except OSError as error:
-        raise refused(out, error) from error
-    typer.echo(f"{out}: frame {frame_id} of {suite}, camera {found.camera}\n{found.told}")
+    show(remake(history, run, suite, frame_id), out, f"frame {frame_id} of {suite}")
 
 
 def report(history: HistoryFolder, run: OfRun = "latest") -> None:

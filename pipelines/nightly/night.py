@@ -25,11 +25,12 @@ from pipelines.nightly.judgement import Judgement, judge
 from pipelines.nightly.other_code import ROOT, Code, freeze
 from pipelines.nightly.outputs import write_all
 from pipelines.nightly.outputs.results import Results
-from pipelines.nightly.page.pictures import Picture
-from pipelines.nightly.page.write import write_page
+from pipelines.nightly.page.frames import rendered_otherwise
+from pipelines.nightly.page.write import Shown, write_page
 from pipelines.nightly.record import Exit, Night, Outcome, State, Timing
 from pipelines.nightly.work_folder import work_folder
 from pipelines.nightly.worst_frames import pictures_of_all, worst
+from pipelines.pages.pictures import Picture
 from pipelines.stages.settings import Setting
 
 ENDED_WAIVERS = "ended waivers"  # name of a fact
@@ -94,7 +95,8 @@ def run_night(request: Request, console: Console) -> Night:
         )  # fmt: skip
         history.append(night, found.findings, accuracy.ALPHA, found.measures)
         write_all(Results(night, found.findings, accuracy.ALPHA, found.measures), request.history)
-        shown = _pictures(desk, night, baseline, found) if baseline and night.exit else []
+        worst_ones = _pictures(desk, night, baseline, found) if baseline and night.exit else []
+        shown = Shown(worst_ones, rendered_otherwise(found.again, night.run_id, request.history))
         write_page(history, night.run_id, request.history / "report.html", shown)
     return night
 
@@ -153,8 +155,8 @@ def _judge_data(
     with found.at_gate(regenerate.GATE):
         of_baseline = {item["name"]: item["value"] for item in desk.history.run(baseline.run)["facts"]}
         same = all(of_baseline.get(name) == value for name, value in machine())
-        again = [item for name, dataset in pictures.items() for item in regenerate.render_again(name, dataset)]
-        found.outcomes.append(regenerate.judge(again, same))
+        found.again += [item for name, dataset in pictures.items() for item in regenerate.render_again(name, dataset)]
+        found.outcomes.append(regenerate.judge(found.again, same))
     with found.at_gate(replay.GATE):
         known = {item["name"]: item["value"] for item in desk.history.run(baseline.run)["data"]}
         old = {name.removeprefix("replay "): value for name, value in known.items() if name.startswith("replay ")}

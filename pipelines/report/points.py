@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from datasets.rows import covariances_by_frame, numbers, of_detector, points_by_frame
 from datasets.store.dataset import Dataset
 from eposit.arrays import Array, Mask
+from pipelines.report.data import frame_means
+from pipelines.statistics import Interval, student
 
 STEEP_DEG = 45.0
 ANGLE_STEP_DEG = 15.0  # of the field-angle table; each row is centred on a multiple
@@ -72,7 +74,16 @@ def tilt_rows(errors: list[PointErrors], frames: list[dict[str, Any]]) -> list[d
                     found = np.isfinite(item.error[mask, :-1, 0]).any(axis=1)
                     counts = {"frames": int(mask.sum()), "boards": int(found.sum())}
                     rows.append(
-                        {"detector": item.detector, "camera": name, "tilt": label, **counts, **_row(item, mask)}
+                        {
+                            "detector": item.detector,
+                            "camera": name,
+                            "tilt": label,
+                            **counts,
+                            **_row(item, mask),
+                            "rms_interval": root_mean_square(item.error[mask, :-1]),
+                            "bias": bias(item, mask),
+                            "circle_interval": root_mean_square(item.error[mask, -1:]),
+                        }
                     )
     return rows
 
@@ -116,6 +127,19 @@ def _angle_bands(theta: Array, own: Mask) -> Iterator[tuple[float, Mask]]:
         near = own & (np.abs(theta - angle) <= ANGLE_STEP_DEG / 2.0)
         if np.any(near):
             yield float(angle), near
+
+
+def bias(item: PointErrors, frames: Mask) -> dict[str, Interval]:
+    """Mean corner error of some frames along x, y and the radius, px, with intervals over the frames."""
+    corners = item.error[frames, :-1]
+    values = {"x": corners[..., 0], "y": corners[..., 1], "radius": item.radial[frames, :-1]}
+    return {name: student(frame_means(each)) for name, each in values.items()}
+
+
+def root_mean_square(values: Array) -> Interval:
+    """Of (f, ...) values, with an interval over the frames; all count alike, NaN values take no part."""
+    found = student(frame_means(values**2))
+    return Interval(*(float(np.sqrt(max(each, 0.0))) for each in (found.value, found.low, found.high)))
 
 
 def _row(item: PointErrors, mask: Mask) -> dict[str, Any]:

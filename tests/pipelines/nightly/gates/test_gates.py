@@ -9,6 +9,7 @@ import pytest
 from pipelines.nightly.gates import accuracy, data, failures, fresh, regenerate, replay, speed, tail
 from pipelines.nightly.judgement import Failures, judge
 from pipelines.nightly.record import Exit, State, Timing
+from render.targets.image_region import Region
 from tests.pipelines.nightly import simulated
 
 POSES = 20
@@ -97,7 +98,15 @@ def test_data():
     ],
 )
 def test_regenerate(grey, points, same, state):
-    frames = [regenerate.Again("pinned-typical", 3, 0, 0.0), regenerate.Again("pinned-typical", 7, grey, points)]
+    stored = np.full((4, 6), 250, np.uint8)
+    other = stored.copy()
+    other[1, 2] += grey
+    region = Region(0, 0, 6, 4)
+    frames = [
+        regenerate.Again("pinned-typical", 3, stored, stored, region, 0.0),
+        regenerate.Again("pinned-typical", 7, stored, other, region, points),
+    ]
+    assert [item.differs for item in frames] == [False, state is not State.PASSED]
     found = regenerate.judge(frames, same)
     assert found.state is state
     if state is State.FAILED:
