@@ -22,6 +22,8 @@ STYLE: Any = {
 }
 FONT = re.compile(r"font: (?:(?P<weight>bold|\d+) )?(?P<size>[\d.]+)px [^;]*")
 
+COLOURS = {"#000000": "currentColor"}  # of the page's text, in either theme
+
 
 def svg(figure: Figure) -> str:
     """The figure, which is closed, as one `<svg>` element that a page's style can recolour for its dark theme.
@@ -52,7 +54,7 @@ def _attributes(style: str) -> str:
         elif name == "opacity" and value == "0":
             found.append(' visibility="hidden"')
         elif name:
-            found.append(f' {name}="{value}"')
+            found.append(f' {name}="{COLOURS.get(value, value)}"')
     return "".join(found)
 
 

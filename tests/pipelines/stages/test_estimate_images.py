@@ -120,7 +120,7 @@ def test_failures_of_a_system_are_rows(own, root, cli):
     never = image_rows(root, "scores", f"{name}:never")
     assert [(row["status"], row["gross_failure"]) for row in never] == [("no_solution", True)] * 2
     text = (root / REPORT).read_text()
-    cells = rf">{name}:never image exact all</th><td>pinhole</td>"
+    cells = rf">{name}:never image exact all</th><td class="name">pinhole</td>"
     assert re.search(rf'{cells}<td class="number" data-value="0.0"><span class="attention">0 of 2</span>', text)
     assert f"{name}:never image exact all failed in 2 of 2 estimates: 2 no_solution." in text
 
