@@ -127,8 +127,10 @@ def _sentence(counts: Counter[Verdict]) -> str:
     """What the claims come to."""
     if not counts:
         return "The parts that were measured judge no claim of the paper."
-    told = [f"{count} {verdict.value}" for verdict, count in counts.items()]
-    return f"Of {counts.total()} claims {', '.join(told)}."
+    return (
+        f"Of {counts.total()} claims {counts[Verdict.HOLDS]} hold, {counts[Verdict.PARTLY]} hold partly and "
+        f"{counts[Verdict.FAILS]} do not."
+    )
 
 
 def markdown(claims: Sequence[Claim]) -> str:

@@ -71,7 +71,8 @@ def _otherwise(item: Again, run_id: str, root: Path) -> Picture:
     share = 100.0 * float(np.mean(difference > 0))
     told = (
         f"differs by {item.grey_levels} grey level{'s' if item.grey_levels != 1 else ''} at most, in "
-        f"{sensible(share)} % of the pixels; true points by {sensible(item.points_px)} px"
+        f"{sensible(share)} % of the pixels; true points "
+        + ("are the same" if item.points_px == 0.0 else f"by {sensible(item.points_px)} px")
     )
     sides = (
         Side("stored", image=stored),
