@@ -101,6 +101,11 @@ def student(values: Array, level: float = LEVEL) -> Interval:
     return Interval(value, value - half, value + half)
 
 
+def root(found: Interval) -> Interval:
+    """Of a mean square with its interval; an end below zero is zero."""
+    return Interval(*(float(np.sqrt(max(end, 0.0))) for end in (found.value, found.low, found.high)))
+
+
 def tail(values: Array) -> Interval | None:
     """95th percentile of (n,) or (n, k) values, k of one unit, with the interval that order statistics give it.
 

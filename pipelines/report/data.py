@@ -93,7 +93,7 @@ def series(scores: pa.Table) -> list[Series]:
         status = part["status"].to_numpy(zero_copy_only=False).astype(str)
         gross = np.array(part["gross_failure"].to_pylist())
         normalised = numbers(part, *(f"{component}_normalised" for component in COMPONENTS))
-        named = dict(zip(SETTING, key, strict=True))
+        named: dict[str, str] = dict(zip(SETTING, key, strict=True))
         found.append(Series(" ".join(key), named, part["frame_id"].to_numpy(), errors, normalised, status, gross))
     return found
 

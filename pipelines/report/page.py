@@ -15,7 +15,8 @@ from pipelines.pages.template import rendered
 from pipelines.report import figures, pictures
 from pipelines.report.data import Cell, Series, cells, normalised_rows, series
 from pipelines.report.points import PointErrors, field_rows, point_errors, tilt_rows
-from pipelines.report.summary import Run, summarised
+from pipelines.report.run import Run
+from pipelines.report.summary import summarised
 from pipelines.report.tables import field_table, normalised_table
 from pipelines.statistics import LEAST_FOR_TAIL
 

@@ -43,7 +43,7 @@ def usual(frames: list[dict[str, Any]], item: PointErrors | None) -> list[Chosen
 def worst(frames: list[dict[str, Any]], item: PointErrors | None, found: Sequence[Series]) -> list[Chosen]:
     """Frames without a board or a pose, then those whose corners are off most, over what the detection states."""
     failed = _failures(frames, found)
-    lost = np.zeros(len(frames), bool) if item is None else ~np.isfinite(item.error[:, :-1, 0]).any(axis=1)
+    lost = np.zeros(len(frames), bool) if item is None else ~np.any(np.isfinite(item.error[:, :-1, 0]), axis=1)
     badness = 1e6 * lost + 1e3 * np.array([len(names) for names in failed])
     if item is not None:
         size = _rms(item.normalised[:, :-1])

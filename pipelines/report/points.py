@@ -13,7 +13,7 @@ from datasets.rows import covariances_by_frame, numbers, of_detector, points_by_
 from datasets.store.dataset import Dataset
 from eposit.arrays import Array, Mask
 from pipelines.report.data import frame_means
-from pipelines.statistics import Interval, student
+from pipelines.statistics import Interval, root, student
 
 STEEP_DEG = 45.0
 ANGLE_STEP_DEG = 15.0  # of the field-angle table; each row is centred on a multiple
@@ -138,8 +138,7 @@ def bias(item: PointErrors, frames: Mask) -> dict[str, Interval]:
 
 def root_mean_square(values: Array) -> Interval:
     """Of (f, ...) values, with an interval over the frames; all count alike, NaN values take no part."""
-    found = student(frame_means(values**2))
-    return Interval(*(float(np.sqrt(max(each, 0.0))) for each in (found.value, found.low, found.high)))
+    return root(student(frame_means(values**2)))
 
 
 def _row(item: PointErrors, mask: Mask) -> dict[str, Any]:

@@ -8,7 +8,8 @@ import pytest
 from datasets.recipe.model import load_recipe
 from pipelines.report.data import ERRORS, Series
 from pipelines.report.points import PointErrors
-from pipelines.report.summary import Run, summarised
+from pipelines.report.run import Run
+from pipelines.report.summary import summarised
 
 POSES, CAMERAS, POINTS, SIGMA = 8, ("perspective", "equisolid"), 55, 0.004
 FRAMES = [
