@@ -19,6 +19,7 @@ from datasets.recipe.cameras import CameraSpec
 from datasets.recipe.cameras import assumed_camera as assumed_camera
 from datasets.recipe.describe import Key, keys_of, sentence, values_of
 from datasets.recipe.quality import QUALITIES, QualityName, quality_text
+from datasets.recipe.targets import target_values
 from datasets.recipe.written_out import written_out
 from datasets.trajectories import TRAJECTORIES, Trajectory
 from datasets.trajectories.helix import Helix
@@ -104,7 +105,7 @@ class Recipe(BaseModel):
     def digest(self) -> str:
         """Hash of everything that decides the content; name and description do not, nor how samples are chosen."""
         content = self.model_dump(mode="json", exclude={"name", "description", "quality"})
-        content["samples"] = self.sample_count()
+        content |= {"samples": self.sample_count(), "target": target_values(self.target)}
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
