@@ -8,6 +8,8 @@ from eposit.arrays import Array
 from render.targets.lattice import Lattice
 from render.targets.sheet import Sheet
 
+PATTERN_MEANING = "kind of the target: chessboard (with a raised circle), plain_chessboard, charuco, aprilgrid, circles"
+
 
 class Target(Protocol):
     """A board with points to be found in its image, in its own frame, mm: x and y along it, z into it.
@@ -38,6 +40,11 @@ class Target(Protocol):
     @property
     def front_mm(self) -> float:
         """Least z of the target, mm: a camera behind it does not see the front."""
+        ...
+
+    @property
+    def point_grid(self) -> tuple[int, int]:
+        """Columns and rows of the points of the print, which come first in `points`, row by row."""
         ...
 
     def rim(self, point: int) -> Array | None:

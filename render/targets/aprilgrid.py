@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from eposit.arrays import Array
+from render.targets import PATTERN_MEANING
 from render.targets.lattice import Cells, Lattice, Rectangle, bit_rectangles, lattice_of
 from render.targets.markers import TAG_FAMILY, marker_bits, marker_count
 from render.targets.printed import PrintedBoard, check_counts, check_length
@@ -29,7 +30,7 @@ class AprilGrid(PrintedBoard):
         ValueError: a value out of range.
     """
 
-    pattern: Annotated[Literal["aprilgrid"], "kind of the target"] = "aprilgrid"
+    pattern: Annotated[Literal["aprilgrid"], PATTERN_MEANING] = "aprilgrid"
     columns: Annotated[int, "tags along x, Kalibr's tagCols"] = 6
     rows: Annotated[int, "tags along y, Kalibr's tagRows"] = 6
     tag_mm: Annotated[float, "side of a tag with its black border, mm; Kalibr's tagSize"] = 88.0
@@ -50,6 +51,11 @@ class AprilGrid(PrintedBoard):
     def pitch_mm(self) -> float:
         """From a tag to the next, mm."""
         return (1.0 + self.spacing) * self.tag_mm
+
+    @property
+    def point_grid(self) -> tuple[int, int]:
+        """Columns and rows of the tags' corners."""
+        return 2 * self.columns, 2 * self.rows
 
     @property
     def pattern_points(self) -> Array:

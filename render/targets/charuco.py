@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from eposit.arrays import Array
+from render.targets import PATTERN_MEANING
 from render.targets.lattice import Lattice, Rectangle, bit_rectangles, lattice_of
 from render.targets.markers import DICTIONARIES, marker_bits, marker_count
 from render.targets.printed import MAX_LINES, PrintedBoard, check_counts, check_length, grid_points
@@ -24,7 +25,7 @@ class Charuco(PrintedBoard):
         ValueError: a value out of range, an unknown dictionary or one with too few markers.
     """
 
-    pattern: Annotated[Literal["charuco"], "kind of the target"] = "charuco"
+    pattern: Annotated[Literal["charuco"], PATTERN_MEANING] = "charuco"
     columns: Annotated[int, "squares along x"] = 10
     rows: Annotated[int, "squares along y"] = 7
     square_mm: Annotated[float, "side of a square, mm"] = 100.0
@@ -63,6 +64,11 @@ class Charuco(PrintedBoard):
     def marker_count(self) -> int:
         """White squares."""
         return self.columns * self.rows // 2
+
+    @property
+    def point_grid(self) -> tuple[int, int]:
+        """Columns and rows of the inner corners."""
+        return self.inner
 
     @property
     def pattern_points(self) -> Array:

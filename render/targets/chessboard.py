@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eposit.arrays import Array
+from render.targets import PATTERN_MEANING
 from render.targets.lattice import Lattice, chess_lattice
 from render.targets.sheet import Sheet
 
@@ -29,7 +30,7 @@ class Chessboard:
         ValueError: a board that is too small, symmetric under half a turn, or a circle that does not fit its square.
     """
 
-    pattern: Annotated[Literal["chessboard"], "kind of the target"] = "chessboard"
+    pattern: Annotated[Literal["chessboard"], PATTERN_MEANING] = "chessboard"
     columns: Annotated[int, "squares along x"] = 10
     rows: Annotated[int, "squares along y"] = 7
     square_mm: Annotated[float, "side of a square, mm"] = 100.0
@@ -77,6 +78,11 @@ class Chessboard:
     def inner(self) -> tuple[int, int]:
         """Inner corners along x and along y."""
         return self.columns - 1, self.rows - 1
+
+    @property
+    def point_grid(self) -> tuple[int, int]:
+        """Columns and rows of the inner corners."""
+        return self.inner
 
     @property
     def corners(self) -> Array:

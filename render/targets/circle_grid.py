@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from eposit.arrays import Array
+from render.targets import PATTERN_MEANING
 from render.targets.lattice import Lattice
 from render.targets.printed import PrintedBoard, check_counts, check_length, grid_points
 
@@ -28,7 +29,7 @@ class CircleGrid(PrintedBoard):
         ValueError: a value out of range.
     """
 
-    pattern: Annotated[Literal["circles"], "kind of the target"] = "circles"
+    pattern: Annotated[Literal["circles"], PATTERN_MEANING] = "circles"
     columns: Annotated[int, "discs in a row"] = 4
     rows: Annotated[int, "rows of discs"] = 11
     spacing_mm: Annotated[float, "distance of rows, and of the discs of a row of the symmetric grid, mm"] = 60.0
@@ -50,6 +51,11 @@ class CircleGrid(PrintedBoard):
     def tells_orientation(self) -> bool:
         """Whether the pattern differs from itself after half a turn."""
         return self.asymmetric and self.rows % 2 == 1
+
+    @property
+    def point_grid(self) -> tuple[int, int]:
+        """Discs in a row, and rows."""
+        return self.columns, self.rows
 
     @property
     def pattern_points(self) -> Array:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from eposit.arrays import Array
+from render.targets import PATTERN_MEANING
 from render.targets.lattice import Lattice, chess_lattice
 from render.targets.printed import PrintedBoard, check_counts, check_length, grid_points
 
@@ -23,7 +24,7 @@ class PlainChessboard(PrintedBoard):
         ValueError: a value out of range.
     """
 
-    pattern: Annotated[Literal["plain_chessboard"], "kind of the target"] = "plain_chessboard"
+    pattern: Annotated[Literal["plain_chessboard"], PATTERN_MEANING] = "plain_chessboard"
     columns: Annotated[int, "squares along x"] = 10
     rows: Annotated[int, "squares along y"] = 7
     square_mm: Annotated[float, "side of a square, mm"] = 100.0
@@ -42,6 +43,11 @@ class PlainChessboard(PrintedBoard):
     def inner(self) -> tuple[int, int]:
         """Inner corners along x and along y."""
         return self.columns - 1, self.rows - 1
+
+    @property
+    def point_grid(self) -> tuple[int, int]:
+        """Columns and rows of the inner corners."""
+        return self.inner
 
     @property
     def pattern_points(self) -> Array:

@@ -72,6 +72,11 @@ class PrintedBoard(ABC):
     def pattern_extent_mm(self) -> tuple[float, float, float, float]:
         """Nominal x_min, x_max, y_min, y_max of the pattern without its margin, mm."""
 
+    @property
+    @abstractmethod
+    def point_grid(self) -> tuple[int, int]:
+        """Columns and rows of the points, which are numbered row by row."""
+
     def lattice(self) -> Lattice:
         """The pattern, in nominal lengths."""
         return _drawn(self)
