@@ -19,8 +19,8 @@ from render.light import Light
 from render.pathtraced.fisheye import sensor_dict
 from render.pathtraced.scene import reference_scene
 from render.region import Image, target_region
-from render.targets.chessboard import Chessboard
 from render.targets.image_region import Region
+from render.targets.kinds import AnyTarget
 
 REFERENCE_RAYS = 1 << 24  # in flight while the reference is traced
 
@@ -41,7 +41,7 @@ class LinearImage:
 
 
 def render_frame(
-    target: Chessboard,
+    target: AnyTarget,
     light: Light,
     camera: Camera,
     cam_from_obj: Pose,
@@ -59,7 +59,7 @@ def render_frame(
 
 
 def render_reference(
-    target: Chessboard,
+    target: AnyTarget,
     light: Light,
     camera: Camera,
     cam_from_obj: Pose,

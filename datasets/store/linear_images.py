@@ -16,6 +16,7 @@ import numpy as np
 from datasets.errors import UserError
 from datasets.plan import Frame, plan
 from datasets.recipe.model import Recipe
+from datasets.recipe.targets import target_values
 from datasets.store.atomic import replace_atomically, write_text
 from eposit import Camera
 from render.frame import LinearImage
@@ -142,7 +143,7 @@ def linear_path(frame: Frame) -> str:
 def linear_key(recipe: Recipe, frame: Frame) -> str:
     """Hash of all that decides a linear image; the sensor model is not among it."""
     parts = {
-        "target": asdict(recipe.target),
+        "target": target_values(recipe.target),
         "light": asdict(recipe.light),
         "camera": asdict(frame.camera.true_camera()),
         "R": frame.cam_from_obj.R.tolist(),

@@ -22,7 +22,10 @@ LEAST_SIDE_PX = 20.0  # local square below which corners stand in a row of their
 
 @dataclass(frozen=True, slots=True)
 class PointErrors:
-    """Errors of one detector: f frames of n points, the circle last."""
+    """Errors of one detector: f frames of n points, the circle last.
+
+    Of a target without a raised circle the points of the print are the corners, and the last place is empty: NaN.
+    """
 
     detector: str
     error: Array  # (f, n, 2) detected minus true, px; NaN where there is none
@@ -46,17 +49,16 @@ def point_errors(dataset: Dataset, frames: list[dict[str, Any]]) -> list[PointEr
     centre = np.array([[frame["cx_px"], frame["cy_px"]] for frame in frames])
     radius = true - centre[:, None]
     radius /= np.maximum(np.linalg.norm(radius, axis=-1, keepdims=True), 1e-9)
-    along, side = _board_directions(true, target.inner)
+    along, side = _board_directions(true, target.point_grid)
     errors: list[PointErrors] = []
     for detector in dict.fromkeys(found["detector"].to_pylist()):
         rows = of_detector(found, detector)
         error = np.stack([points_by_frame(rows, target)[i] for i in ids]) - true
         covariance = np.stack([covariances_by_frame(rows, target)[i] for i in ids])
         status = rows["status"].to_numpy(zero_copy_only=False).astype(str).reshape(-1, n)
-        radial, along_x = np.sum(error * radius, axis=-1), np.sum(error * along, axis=-1)
-        errors.append(
-            PointErrors(detector, error, _whitened(error, covariance), radial, along_x, theta, side, inside, status)
-        )
+        radial, along_x = np.sum(error * radius, axis=-1), np.sum(error * along[:, :n], axis=-1)
+        values = (error, _whitened(error, covariance), radial, along_x, theta, side, inside, status)
+        errors.append(PointErrors(detector, *(_with_circle(item, along.shape[1]) for item in values)))
     return errors
 
 
@@ -160,10 +162,22 @@ def _row(item: PointErrors, mask: Mask) -> dict[str, Any]:
     }
 
 
+def _with_circle(values: NDArray[Any], places: int) -> NDArray[Any]:
+    """(f, places, ...) values of (f, n, ...), with an empty last place where the target has no circle."""
+    missing = places - values.shape[1]
+    if missing <= 0:
+        return values
+    empty = np.zeros((len(values), missing, *values.shape[2:]), values.dtype)
+    return np.concatenate((values, np.full_like(empty, np.nan) if values.dtype.kind == "f" else empty), axis=1)
+
+
 def _board_directions(true: Array, inner: tuple[int, int]) -> tuple[Array, Array]:
-    """(f, n, 2) unit image of the board's x and (f, n) side of the local square, by differences of true corners."""
+    """(f, n, 2) unit image of the board's x and (f, n) side of the local square, by differences of true points.
+
+    n counts the points of the print and a circle behind them.
+    """
     across, down = inner
-    grid = true[:, :-1].reshape(-1, down, across, 2)
+    grid = true[:, : across * down].reshape(-1, down, across, 2)
     along_y, along_x = np.gradient(grid, axis=(1, 2))
     area = np.abs(along_x[..., 0] * along_y[..., 1] - along_x[..., 1] * along_y[..., 0])
     unit = along_x / np.linalg.norm(along_x, axis=-1, keepdims=True)
