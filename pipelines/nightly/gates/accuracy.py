@@ -25,6 +25,9 @@ def judge(found: Judgement, waived: Waived) -> Outcome:
     if found.only_old:
         told = f"not read tonight, though the baseline has them: {', '.join(found.only_old)}"
         return Outcome(GATE, State.WARNED, told, findings=tuple(unproved))
+    if found.only_new:
+        told = f"not judged, as the baseline does not have them: {', '.join(found.only_new)}; accept a run that has"
+        return Outcome(GATE, State.WARNED, told, findings=tuple(unproved))
     if unproved:
         told = f"{len(unproved)} of {len(found.findings)} metrics are neither shown to be worse nor to be equal"
         return Outcome(GATE, State.WARNED, told, findings=tuple(unproved))
