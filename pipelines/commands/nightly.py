@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 NIGHTS_BACK = 14  # of the trend that `explain` prints
 REGIMES = ["typical", "harsh"]
+LONGEST_S = 86400.0  # that a function may take
 
 HistoryFolder = Annotated[Path, typer.Option("--history", help="Folder of the nights: history, baselines, pictures.")]
 Regimes = Annotated[list[str], typer.Option("--regime", help="Sensor regime of the pictures; may be given again.")]
@@ -92,8 +93,8 @@ def run(
     for gate in without or []:
         if gate not in ("fresh", "speed"):
             raise UserError(f"--without {gate}: choose fresh or speed; the other gates cost nothing")
-    if not time_limit > 0.0:
-        raise UserError(f"--time-limit {time_limit:g}: give seconds above 0, as 600")
+    if not 0.0 < time_limit <= LONGEST_S:
+        raise UserError(f"--time-limit {time_limit:g}: give seconds above 0 and at most {LONGEST_S:g}, as 600")
     regimes = tuple(dict.fromkeys(regime))
     request = Request(
         recipe=recipe,

@@ -99,7 +99,7 @@ class Code:
         words = json.dumps([[str(word) for word in command] for command in commands])
         done = self.run_program(RUN_COMMANDS, words, what=", ".join(dict.fromkeys(str(item[0]) for item in commands)))
         if not done.stdout.rstrip().endswith(DONE):
-            raise OtherCodeError(f"{self._named} ended its process before it had done its work, as os._exit does")
+            raise OtherCodeError(f"{self._named}: the process ended before its work was done, as by os._exit")
         return done.stderr
 
     def run_program(self, program: str, *words: str, what: str) -> subprocess.CompletedProcess[str]:
@@ -111,7 +111,7 @@ class Code:
         try:
             done = child.run(self.command(program, *words), self.limit_s)
         except subprocess.TimeoutExpired:
-            raise OtherCodeError(f"{self._named} did not end within {self.limit_s:g} s, {what}") from None
+            raise OtherCodeError(f"{self._named}, {what}: did not end within {self.limit_s:g} s") from None
         if done.returncode:
             said = " ".join((done.stderr or done.stdout).strip().splitlines()[-LAST_LINES:])
             raise OtherCodeError(f"{self._named}, {what}: {said or f'exit {done.returncode}'}")

@@ -67,7 +67,13 @@ class Function:
         try:
             sys.stderr.write(code.run(*words))
         except OtherCodeError as error:
-            raise OtherCodeError(f"{self.option} {self.name}: {error}") from None
+            raise OtherCodeError(self.told(error)) from None
+
+    def told(self, error: OtherCodeError) -> str:
+        """What went wrong, with the function's name once."""
+        named = f"{self.option} {self.name}"
+        _, found, rest = str(error).partition(f"error: {named}")
+        return named + rest if found else f"{named}: {error}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,9 +156,7 @@ def find(function: Function, code: Code) -> UserFiles:
         said = code.run_program(FIND, function.option, function.name, what="import").stdout
         found = UserFiles(**json.loads(said.rstrip().rpartition("\n")[2]))
     except OtherCodeError as error:
-        told = str(error).rpartition("error: ")[2]
-        named = told if told.startswith(function.option) else f"{function.option} {function.name}: {told}"
-        raise UserError(named) from None
+        raise UserError(function.told(error)) from None
     except (ValueError, TypeError):
         told = "importing it ended its process; mend it, so that it is imported without an effect"
         raise UserError(f"{function.option} {function.name}: {told}") from None
