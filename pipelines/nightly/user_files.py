@@ -11,6 +11,7 @@ from pipelines.nightly.other_code import PACKAGES
 
 MOST_BYTES = 200_000_000  # of a copy; more, such as weights of a network, is not copied every time it changes
 SKIPPED = "__pycache__"
+LIBRARIES = frozenset(("site-packages", "dist-packages"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,13 +47,17 @@ def _of_package(folder: Path) -> Iterator[Path]:
 
 def _imported(root: Path, top: str) -> Iterator[Path]:
     """Files of modules that came from a folder; where libraries lie there, too, only those of one package."""
-    libraries = [Path(prefix).resolve() for prefix in {sys.prefix, sys.base_prefix}]
-    among_libraries = any(root.is_relative_to(prefix) for prefix in libraries)
+    among_libraries = _is_library(root)
     for name, item in list(sys.modules.items()):
         first, file = name.partition(".")[0], getattr(item, "__file__", None)
-        if file is None or (first in PACKAGES and first != top) or (among_libraries and first != top):
+        if file is None or (first != top and (among_libraries or first in PACKAGES)):
             continue
         path = Path(file).resolve()
-        is_library = any(path.is_relative_to(prefix) for prefix in libraries)
-        if path.is_relative_to(root) and (among_libraries or not is_library):
+        if path.is_relative_to(root) and (among_libraries or not _is_library(path)):
             yield path
+
+
+def _is_library(path: Path) -> bool:
+    """Whether something lies where Python and installed packages do; an environment may lie in the user's folder."""
+    prefixes = (Path(prefix).resolve() for prefix in (sys.prefix, sys.base_prefix))
+    return not LIBRARIES.isdisjoint(path.parts) or any(path.is_relative_to(prefix) for prefix in prefixes)
