@@ -170,9 +170,7 @@ def test_a_failure_of_a_users_system_can_be_waived(night, own):
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_function_that_breaks(night, own, fault):
     """One that raises or exits has failures, code 1; one that ends its process, hangs or is not understood, code 4."""
-    (own / "mine.py").write_text(
-        MINE.replace("    return helper.solve(points_in_obj", f"{FAULTS[fault]}\n    return (", 1)
-    )
+    (own / "mine.py").write_text(MINE.replace("camera):\n", f"camera):\n{FAULTS[fault]}\n", 1))
     started = time.monotonic()
     limit = ("--time-limit", 30) if fault == "hangs" else ()
     done, row = night(*QUICK, *OWN, *limit)
