@@ -50,7 +50,8 @@ RUNS = pa.schema(
             "data",
             _PAIRS,
             "what was read, with its hash: `pinned` and each suite with its regime, the pictures; `replay` with "
-            "a suite and a setting, poses of unchanged points; `code`, its files; `fresh seed`, that seed itself",
+            "a suite and a setting, poses of unchanged points; `code`, its files; `code of` a user's "
+            "function, its files; `fresh seed`, that seed itself",
         ),
         _field(
             "gates",
