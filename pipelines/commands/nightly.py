@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 NIGHTS_BACK = 14  # of the trend that `explain` prints
 REGIMES = ["typical", "harsh"]
+LONGEST_S = 86400.0  # that a function may take
 
 HistoryFolder = Annotated[Path, typer.Option("--history", help="Folder of the nights: history, baselines, pictures.")]
 Regimes = Annotated[list[str], typer.Option("--regime", help="Sensor regime of the pictures; may be given again.")]
@@ -25,9 +26,29 @@ Seed = Annotated[int | None, typer.Option(min=0, help="Seed of the fresh picture
 Without = Annotated[
     list[str] | None, typer.Option("--without", help="Gate that is left out: fresh or speed; may be given again.")
 ]
-Judged = Annotated[
+Estimators = Annotated[
     list[str] | None,
-    typer.Option("--solver", help="One more solver, or your own function, judged on the pinned pictures."),
+    typer.Option(
+        "--estimator",
+        metavar="PACKAGE.MODULE:FUNCTION",
+        help="Your whole system: a function of image, camera and target; may be given again.",
+    ),
+]
+PoseFiles = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--poses",
+        metavar="FILE",
+        help="Poses of another system for the pinned pictures, .csv or .parquet, as poses-{regime}.csv if there are "
+        "several regimes; may be given again.",
+    ),
+]
+PoseNames = Annotated[
+    list[str] | None, typer.Option("--name", help="Name of the poses of --poses, in their order, in tables and page.")
+]
+TimeLimit = Annotated[
+    float,
+    typer.Option(metavar="SECONDS", help="Time that each of your functions may take on the pictures of a regime."),
 ]
 RunName = Annotated[str, typer.Argument(metavar="RUN", help="Run of the history, or `latest`.")]
 SliceName = Annotated[str, typer.Argument(metavar="SLICE", help="As regime/camera/system.")]
@@ -49,7 +70,11 @@ def run(
     history: HistoryFolder,
     regime: Regimes = REGIMES,
     seed: Seed = None,
-    solver: Judged = None,
+    solver: o.MoreSolvers = None,
+    estimator: Estimators = None,
+    poses: PoseFiles = None,
+    name: PoseNames = None,
+    time_limit: TimeLimit = 3600.0,
     without: Without = None,
     workers: o.Workers = 1,
     quiet: o.Quiet = False,
@@ -59,17 +84,22 @@ def run(
     The pinned pictures are made in the first night. Without a baseline there is no verdict: `nightly accept` makes a
     run the baseline, and keeps a copy of its code. The page, and files for machines, lie in the history's folder.
     """
-    from pipelines.nightly.night import Request, run_night
+    from pipelines.nightly.desk import Request
+    from pipelines.nightly.night import run_night
+    from pipelines.nightly.systems import asked
 
-    for name in without or []:
-        if name not in ("fresh", "speed"):
-            raise UserError(f"--without {name}: choose fresh or speed; the other gates cost nothing")
+    for gate in without or []:
+        if gate not in ("fresh", "speed"):
+            raise UserError(f"--without {gate}: choose fresh or speed; the other gates cost nothing")
+    if not 0.0 < time_limit <= LONGEST_S:
+        raise UserError(f"--time-limit {time_limit:g}: give seconds above 0 and at most {LONGEST_S:g}, as 600")
+    regimes = tuple(dict.fromkeys(regime))
     request = Request(
         recipe=recipe,
         history=history,
-        regimes=tuple(dict.fromkeys(regime)),
+        regimes=regimes,
         seed=int(f"{datetime.date.today():%Y%m%d}") if seed is None else seed,
-        solvers=_settings(solver or []),
+        systems=asked(recipe, regimes, (solver or [], estimator or []), (poses or [], name or []), time_limit),
         workers=workers,
         without=tuple(without or ()),
     )
@@ -141,15 +171,6 @@ def report(history: HistoryFolder, run: OfRun = "latest") -> None:
     nights = History(history)
     write_page(nights, nights.name_of(run), path)
     typer.echo(str(path))
-
-
-def _settings(names: list[str]) -> tuple[Any, ...]:
-    from pipelines.adapters.registry import find_solver, takes_four
-    from pipelines.stages.settings import Setting
-
-    for name in names:
-        find_solver(name)
-    return tuple(Setting(name, use="four" if takes_four(name) else "all") for name in names)
 
 
 def _print_night(night: Night, history: Path) -> None:

@@ -19,9 +19,10 @@ from datasets.store.dataset import Dataset
 from datasets.store.nulls import with_nans
 from eposit import Status
 from eposit.arrays import Array, Mask
-from pipelines.nightly.metrics import CORNERS, METRICS, POSES, Metric
+from pipelines.nightly.metrics import CORNERS, METRICS, POSES, SIGNED_POSES, Metric
 from pipelines.report.data import SETTING
 from pipelines.report.points import PointErrors, point_errors
+from pipelines.stages.estimate import REACHES_BOUND
 from render.sensor.presets import regime_of
 
 EXACT_POINTS = "truth"  # poses of exact points: their errors are rounding, whose size means nothing
@@ -99,12 +100,12 @@ SCHEMA = pa.schema(
 
 
 def slices(measures: pa.Table) -> list[Slice]:
-    """The slices of a table of measures, in the order of the table."""
+    """The slices of a table of measures, in the order of the table; one of before a metric was added lacks it."""
     keys = list(zip(*(measures[name].to_pylist() for name in KEY), strict=True))
     found: list[Slice] = []
     for key in dict.fromkeys(keys):
         rows = measures.filter(pa.array([other == key for other in keys])).sort_by("frame_id")
-        values = {name: rows[name].to_numpy(zero_copy_only=False) for name in METRICS}
+        values = {name: rows[name].to_numpy(zero_copy_only=False) for name in METRICS if name in rows.column_names}
         held = {name: column for name, column in values.items() if np.any(np.isfinite(column))}
         ids = [rows[name].to_numpy() for name in ("frame_id", "pose_id")]
         failed = rows["failed"].to_numpy(zero_copy_only=False)
@@ -144,13 +145,17 @@ def _of_poses(dataset: Dataset, frames: list[dict[str, Any]], regime: str) -> li
             "pose_nees": nees,
             "pose_log_t": np.log(length),
             "pose_log_R": np.log(_column(scores, "rotation_error_deg")),
+            **{f"t{axis}_error": _column(scores, f"t{axis}_error_mm") for axis in "xyz"},
+            **{f"r{axis}_error": _column(scores, f"r{axis}_error_deg") for axis in "xyz"},
         }
     exact = scores["point_source"].to_numpy(zero_copy_only=False) == EXACT_POINTS
     for name in dict.fromkeys(names[~exact].tolist()):
         own = names == name
         means = {metric: _mean_by_row(row[own], column[own], len(frames)) for metric, column in values.items()}
         missing = np.bincount(row[own], failed[own], len(frames)) > 0.0
-        found.append(_table(frames, regime, name, missing, POSES, means))
+        # The choice is one of the solver and not of its numbers: one that begins to state covariances loses nothing.
+        metrics = POSES if name.split()[0] == REACHES_BOUND else (*POSES, *SIGNED_POSES)
+        found.append(_table(frames, regime, name, missing, metrics, means))
     return found
 
 
