@@ -56,6 +56,8 @@ class Slice:
     def by_pose(self, metric: str, poses: NDArray[np.int64]) -> Array:
         """(p,) mean of a metric over the frames of each of `poses`, which are sorted; NaN where none has it."""
         values = self.values[metric]
+        if np.array_equal(self.pose_id, poses):  # one frame for each, as wherever a camera is in a pose once
+            return np.where(np.isfinite(values), values, np.nan)
         own = np.isfinite(values) & np.isin(self.pose_id, poses)
         place = np.searchsorted(poses, self.pose_id[own])
         with np.errstate(invalid="ignore"):
@@ -101,9 +103,13 @@ SCHEMA = pa.schema(
 def slices(measures: pa.Table) -> list[Slice]:
     """The slices of a table of measures, in the order of the table."""
     keys = list(zip(*(measures[name].to_pylist() for name in KEY), strict=True))
+    number = {key: i for i, key in enumerate(dict.fromkeys(keys))}
+    of_row = np.array([number[key] for key in keys])
+    frame = measures["frame_id"].to_numpy()
     found: list[Slice] = []
-    for key in dict.fromkeys(keys):
-        rows = measures.filter(pa.array([other == key for other in keys])).sort_by("frame_id")
+    for key, i in number.items():
+        own = np.flatnonzero(of_row == i)
+        rows = measures.take(own[np.argsort(frame[own], kind="stable")])
         values = {name: rows[name].to_numpy(zero_copy_only=False) for name in METRICS}
         held = {name: column for name, column in values.items() if np.any(np.isfinite(column))}
         ids = [rows[name].to_numpy() for name in ("frame_id", "pose_id")]
