@@ -97,11 +97,10 @@ def _changes(old: Slice, new: Slice, paired: bool) -> list[Change]:
     metrics = [METRICS[name] for name in names]
     if paired:
         poses = np.intersect1d(old.pose_id, new.pose_id)
-        sides = (np.array([side.by_pose(name, poses) for name in names]) for side in (old, new))
-        return compare_paired(metrics, *(side.reshape(len(names), len(poses)) for side in sides))
+        return compare_paired(metrics, old.by_pose(names, poses), new.by_pose(names, poses))
     found: list[Change] = []
     for metric in metrics:
-        own = (side.by_pose(metric.name, np.unique(side.pose_id)) for side in (old, new))
+        own = (side.by_pose([metric.name], np.unique(side.pose_id))[0] for side in (old, new))
         change = compare_unpaired(metric, *own)
         found += [] if change is None else [change]
     return found
@@ -111,9 +110,9 @@ def _failures(old: Slice, new: Slice) -> Failures:
     frames, of_old, of_new = np.intersect1d(old.frame_id, new.frame_id, return_indices=True)
     before, after = old.failed[of_old], new.failed[of_new]
     gone, come = after & ~before, before & ~after
-    for name in old.values.keys() | new.values.keys():
-        has, has_now = (side.has(name)[of] for side, of in ((old, of_old), (new, of_new)))
-        gone, come = gone | (has & ~has_now), come | (has_now & ~has)
+    names = list(old.values | new.values)
+    has, has_now = (side.has(names)[:, of] for side, of in ((old, of_old), (new, of_new)))
+    gone, come = gone | np.any(has & ~has_now, axis=0), come | np.any(has_now & ~has, axis=0)
     return Failures(new.name, len(frames), _ids(frames, gone), _ids(frames, come & ~gone))
 
 

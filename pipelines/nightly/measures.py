@@ -6,6 +6,7 @@ A system is a detector, whose rows hold the corners and the circle, or a setting
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -49,15 +50,19 @@ class Slice:
         """As shown and as `explain` takes it."""
         return f"{self.regime}/{self.camera}/{self.system}"
 
-    def has(self, metric: str) -> Mask:
-        """(f,) whether a frame has a metric."""
-        return np.isfinite(self.values[metric]) if metric in self.values else np.zeros(len(self.frame_id), bool)
+    def has(self, metrics: Sequence[str]) -> Mask:
+        """(m, f) whether a frame has a metric."""
+        nothing = np.full(len(self.frame_id), np.nan)
+        return np.isfinite([self.values.get(name, nothing) for name in metrics]).reshape(len(metrics), -1)
 
-    def by_pose(self, metric: str, poses: NDArray[np.int64]) -> Array:
-        """(p,) mean of a metric over the frames of each of `poses`, which are sorted; NaN where none has it."""
-        values = self.values[metric]
+    def by_pose(self, metrics: Sequence[str], poses: NDArray[np.int64]) -> Array:
+        """(m, p) means of metrics over the frames of each of `poses`, which are sorted; NaN where none has it."""
+        values = np.array([self.values[name] for name in metrics]).reshape(len(metrics), -1)
         if np.array_equal(self.pose_id, poses):  # one frame for each, as wherever a camera is in a pose once
             return np.where(np.isfinite(values), values, np.nan)
+        return np.array([self._means(row, poses) for row in values]).reshape(len(metrics), -1)
+
+    def _means(self, values: Array, poses: NDArray[np.int64]) -> Array:
         own = np.isfinite(values) & np.isin(self.pose_id, poses)
         place = np.searchsorted(poses, self.pose_id[own])
         with np.errstate(invalid="ignore"):

@@ -23,7 +23,8 @@ from pipelines.nightly.other_code import ROOT
 from pipelines.stages import generate
 
 RECIPE, REGIMES = "nightly", ("typical", "harsh")
-DRAWS = 5  # 20 ordered pairs of each of 800 frames
+DRAWS = 3  # 6 ordered pairs of each of 800 frames
+BLOCK = 10  # poses that are measured and kept together
 MADE_BY = ("eposit", "render", "datasets", "pipelines/detection", "pipelines/stages/generate.py")
 CORNER_PX, CIRCLE_PX = 0.005, 0.010  # scatter of one point in the regime `typical`, by these very draws
 STEP = 1e-6  # rad, and relative to the distance, of numerical derivatives: good to 1e-9
@@ -43,16 +44,36 @@ class Pool:
 
 @functools.cache
 def pool():
-    """The pool, measured if it is not there: some six minutes of processor time."""
-    path = ROOT / "out" / "studies" / f"noise-draws-{_digest()[:16]}.npz"
+    """The pool; parts that are not there are measured, all of them in some five minutes of processor time."""
+    recipe = recipe_of(REGIMES[0])
+    parts = [[part(r, block) for block in range(_blocks(recipe))] for r in range(len(REGIMES))]
+    error, covariance = (
+        np.stack([np.concatenate([own[i] for own in blocks], 1) for blocks in parts]) for i in range(2)
+    )
+    names = tuple(camera.name for camera in recipe.cameras)
+    slope, offset = _geometries(recipe, plan(recipe), len(names))
+    return Pool(names, np.array(recipe.four_indices()), error, covariance, slope, offset)
+
+
+def part(r, block):
+    """Errors (D, P, C, N, 2) and covariances (D, P, C, N, 2, 2) of BLOCK poses of a regime, kept on disk."""
+    path = ROOT / "out" / "studies" / f"noise-draws-{_digest()[:16]}-{REGIMES[r]}-{block}.npz"
     if not path.is_file():
         path.parent.mkdir(parents=True, exist_ok=True)
-        measured = dataclasses.asdict(_measured())
+        recipe = recipe_of(REGIMES[r])
+        cameras = len(recipe.cameras)
+        frames = plan(recipe)[block * BLOCK * cameras : (block + 1) * BLOCK * cameras]
+        draws = [_read(recipe, frame) for frame in frames]
+        both = (np.moveaxis(np.array([[draw[i] for draw in own] for own in draws]), 1, 0) for i in range(2))
+        error, covariance = (_split(values, cameras, 1) for values in both)
         with replace_atomically(path) as temporary, temporary.open("wb") as file:
-            np.savez(file, **measured)
+            np.savez(file, error=error, covariance=covariance)
     with np.load(path) as held:
-        values = dict(held)
-    return Pool(tuple(values.pop("cameras").tolist()), **values)
+        return held["error"], held["covariance"]
+
+
+def _blocks(recipe):
+    return -(-len(plan(recipe)) // (BLOCK * len(recipe.cameras)))
 
 
 def recipe_of(regime):
@@ -71,19 +92,6 @@ def synthetic(poses, rng):
     error = sigma[..., None] * rng.standard_normal((len(REGIMES), DRAWS, *sigma.shape, 2))
     names = tuple(camera.name for camera in recipe.cameras)
     return Pool(names, np.array(recipe.four_indices()), error, covariance, slope, offset)
-
-
-def _measured():
-    recipes = [recipe_of(regime) for regime in REGIMES]
-    count = len(recipes[0].cameras)
-    found = [[_read(recipe, frame) for frame in plan(recipe)] for recipe in recipes]  # regimes, frames, draws
-    error, covariance = (
-        _split(np.moveaxis(np.array([[[draw[i] for draw in f] for f in r] for r in found]), 2, 1), count, 2)
-        for i in range(2)
-    )
-    names = tuple(camera.name for camera in recipes[0].cameras)
-    four = np.array(recipes[0].four_indices())
-    return Pool(names, four, error, covariance, *_geometries(recipes[0], plan(recipes[0]), count))
 
 
 def _geometries(recipe, frames, cameras):
