@@ -7,3 +7,7 @@ def power_page():
 
 def quiet_page():
     pass
+
+
+def changes_page():
+    pass

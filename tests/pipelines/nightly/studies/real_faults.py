@@ -1,4 +1,4 @@
-"""The faults of `faults`, for real pictures: in what detection finds, in the solver's camera, in its end, in its time."""
+"""The faults of `faults` on real pictures: in what detection finds, in the solver's camera, end or time."""
 
 from __future__ import annotations
 
