@@ -19,6 +19,9 @@ def keep(name, values):
     write_text(FOLDER / f"{name}.json", json.dumps(values | made, indent=1))
 
 
-def read(name):
-    """One study's findings."""
-    return json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8"))
+def parts(begin):
+    """Every study's findings whose name begins so, in the order of the names, with their `name`."""
+    return [
+        json.loads(path.read_text(encoding="utf-8")) | {"name": path.stem}
+        for path in sorted(FOLDER.glob(f"{begin}*.json"))
+    ]

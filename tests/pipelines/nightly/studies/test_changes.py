@@ -26,8 +26,8 @@ pytestmark = pytest.mark.slow
 
 POSES = 8
 OPENCV = "4.12.0.88"
-SUM = 'np.einsum("kb,kib->ib", residual.reshape(2 * n, b), rows)'  # of the gradient, in `eposit.refine.reprojection`
-REVERSED = 'np.einsum("kb,kib->ib", residual.reshape(2 * n, b)[::-1], rows[::-1])'
+SUM = "np.add.reduce(force, axis=0"  # of the gradient over the points, in `eposit.refine.reprojection`
+REVERSED = "np.add.reduce(force[::-1], axis=0"
 
 
 @pytest.fixture(scope="module")
