@@ -50,6 +50,8 @@ def pool():
     error, covariance = (
         np.stack([np.concatenate([own[i] for own in blocks], 1) for blocks in parts]) for i in range(2)
     )
+    for values in (covariance, error):
+        _fill(values, error)
     names = tuple(camera.name for camera in recipe.cameras)
     slope, offset = _geometries(recipe, plan(recipe), len(names))
     return Pool(names, np.array(recipe.four_indices()), error, covariance, slope, offset)
@@ -70,6 +72,14 @@ def part(r, block):
             np.savez(file, error=error, covariance=covariance)
     with np.load(path) as held:
         return held["error"], held["covariance"]
+
+
+def _fill(values, error):
+    """Draws in which a point was not found get another draw's frame: gate `failures` is about the same pictures."""
+    found = np.all(np.isfinite(error), axis=(-1, -2))  # (R, D, P, C)
+    draw = np.where(found, np.arange(DRAWS)[:, None, None], np.argmax(found, axis=1)[:, None])
+    regime, _, pose, camera = np.indices(found.shape)
+    values[:] = values[regime, draw, pose, camera]
 
 
 def _blocks(recipe):
