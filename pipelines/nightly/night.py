@@ -159,7 +159,7 @@ def _judge_data(
         run = desk.history.run(baseline.run)
         known, facts = _mapping(run["data"]), _mapping(run["facts"])
         old = {name.removeprefix("replay "): value for name, value in known.items() if name.startswith("replay ")}
-        moved = replay.largest_move(
+        moved = replay.largest_change(
             desk.history.measures(baseline.measures[suites.PINNED]), found.measures[f"{suites.PINNED} new"]
         )
         reasons = (*other_machine(facts, dict(machine())), *other_code(known.get("code"), found.data["code"]))

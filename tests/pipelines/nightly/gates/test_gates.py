@@ -115,22 +115,22 @@ def test_replay_never_fails_and_tells_how_far_and_why():
     for reasons, told in (((OTHER,), OTHER), ((), "code, versions and machine are the baseline's")):
         found = replay.judge(old, old | {"typical noisy": "c"}, 2e-9, reasons)
         assert found.state is State.CHANGED
-        assert found.sentence.endswith(f"by at most 2e-09 of their stated deviations; {told}")
+        assert found.sentence.endswith(f"by at most 2e-09 of themselves; {told}")
     assert replay.judge({}, old, 0.0, ()).state is State.NOT_RUN
 
 
 def test_replay_measures_poses_from_noisy_points_only():
-    """A system of that name moves by 0.25 in one component of one frame, the detected one by more."""
+    """A system of that name has errors that are a quarter longer in one frame."""
     old = simulated.night(POSES, np.random.default_rng(0))
-    assert np.isnan(replay.largest_move(old, old))
-    name, place = "ty_normalised", old.schema.get_field_index("ty_normalised")
+    assert np.isnan(replay.largest_change(old, old))
+    name, place = "pose_log_R", old.schema.get_field_index("pose_log_R")
     systems = [text.replace("detected", "truth+0.4px") for text in old["system"].to_pylist()]
     noisy = old.set_column(old.schema.get_field_index("system"), "system", pa.array(systems))
     values = old[name].to_numpy(zero_copy_only=False).copy()
-    values[np.flatnonzero(np.isfinite(values))[3]] += 0.25
+    values[np.flatnonzero(np.isfinite(values))[3]] += np.log(1.25)
     column = pa.array(values, mask=np.isnan(values))
-    assert replay.largest_move(noisy, noisy.set_column(place, name, column)) == pytest.approx(0.25)
-    assert np.isnan(replay.largest_move(old, old.set_column(place, name, column)))
+    assert replay.largest_change(noisy, noisy.set_column(place, name, column)) == pytest.approx(0.25)
+    assert np.isnan(replay.largest_change(old, old.set_column(place, name, column)))
 
 
 def test_differences_are_told_with_both_values():
