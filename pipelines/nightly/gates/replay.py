@@ -41,7 +41,7 @@ def judge(old: Mapping[str, str], new: Mapping[str, str], share: float, reasons:
 
 
 def largest_change(old: pa.Table, new: pa.Table) -> float:
-    """Of the lengths of errors of poses from true points with noise, as a share; NaN without any. Tables of measures."""
+    """Of the errors of poses from true points with noise, as a share; NaN without any. old, new: tables of measures."""
     before = {item.name: item for item in slices(old) if NOISY in item.system}
     changes = [_change(before[item.name], item) for item in slices(new) if item.name in before]
     return max((change for change in changes if np.isfinite(change)), default=float("nan"))
