@@ -6,12 +6,16 @@ import numpy as np
 
 from datasets.store.atomic import write_text
 from pipelines.nightly.other_code import ROOT
-from tests.pipelines.nightly.studies import found, texts
+from tests.pipelines.nightly.studies import faults, found, texts
 from tests.pipelines.nightly.studies.reading import ALL, FOUR, NOISY
 from tests.pipelines.nightly.studies.simulated_nights import OTHER, SAME
 
 FOLDER = ROOT / "docs" / "evidence"
 NONE = "not measured"
+FAULTS = (
+    faults.CORNER_BIAS, faults.MORE_NOISE, faults.CIRCLE, faults.FOCAL, faults.COVARIANCE, faults.SHIFT,
+)  # fmt: skip
+UNITS = {fault.name: fault.unit for fault in FAULTS}
 
 
 def write_pages():
@@ -25,14 +29,13 @@ def power_page():
     """`nightly-power.md`."""
     simulated = found.parts("power-")
     real = found.parts("real-")
-    shares = [part for part in simulated if "shares" in part]
     text = [
         texts.POWER,
         made_with(simulated + real, "tests/pipelines/nightly/studies"),
         "## Simulated nights",
         texts.SIMULATED,
     ]
-    text += [_share_table(shares), "## The smallest size that is caught", texts.SMALLEST, _smallest_table(shares)]
+    text += [_share_table(simulated), "## The smallest size that is caught", texts.SMALLEST, _smallest_table(simulated)]
     text += ["## A bias that grows", texts.DRIFT, _drift_table(simulated), "## A solver that ends early", texts.EARLY]
     text += [_early_table(simulated), "## Real nights", texts.REAL, _real_table(real)]
     _write("nightly-power", text)
@@ -78,27 +81,22 @@ def changes_page():
 
 
 def _share_table(parts):
-    columns = ["fault", "size", *(f"{poses} poses, {noise}" for poses in (20, 80) for noise in (SAME, OTHER))]
+    keys = [f"{noise} {poses}" for poses in (20, 80) for noise in (SAME, OTHER)]
+    shares = {part["name"].removeprefix("power-"): part["shares"] for part in parts if "shares" in part}
+    names = dict.fromkeys(name for own in shares.values() for name in own)
     rows = []
-    for part in parts:
-        cells = [part["shares"][f"{noise} {poses}"] for poses in (20, 80) for noise in (SAME, OTHER)]
-        shown = [f"{cell['caught']:.3f}, {cell['right']:.3f}" for cell in cells]
-        rows.append([_fault(part), _size(part["size"], part["unit"]), *shown])
-    return table(columns, rows)
+    for name in names:
+        cells = [shares[key][name] if key in shares else None for key in keys]
+        rows.append([name, SIZES[name], *(NONE if cell is None else "{:.3f}, {:.3f}".format(*cell) for cell in cells)])
+    return table(["fault", "size", *(f"{key} poses" for key in keys)], rows)
 
 
 def _smallest_table(parts):
     keys = (f"{SAME} 20", f"{OTHER} 20", f"{OTHER} 80")
-    rows = [
-        [_fault(part), *(_size(part["smallest"][key], part["unit"]) for key in keys)]
-        for part in parts
-        if part["smallest"]
-    ]
-    return table(["fault", f"20 poses, {SAME}", f"20 poses, {OTHER}", f"80 poses, {OTHER}"], rows)
-
-
-def _fault(part):
-    return part["name"].removeprefix("power-")
+    held = {part["name"].removeprefix("power-smallest-"): part["smallest"] for part in parts if "smallest" in part}
+    names = dict.fromkeys(name for own in held.values() for name in own)
+    rows = [[name, *(_size(held[key][name], UNITS[name]) if key in held else NONE for key in keys)] for name in names]
+    return table(["fault", *(f"{key} poses" for key in keys)], rows)
 
 
 def _size(value, unit):
@@ -175,6 +173,10 @@ def made_with(parts, tests):
         f"Made by `python -m pytest -m slow {tests}` on {days} (commit {commits}), in {seconds / 60:.0f} minutes of "
         f"processor time on a machine that other work shared: {machine['processor']}; {versions}."
     )
+
+
+SIZES = {fault.name: _size(fault.size, fault.unit) for fault in FAULTS}
+SIZES |= {"slower detection": "15 %", "new failure": "1 frame"}
 
 
 def table(columns, rows):

@@ -8,7 +8,7 @@ import numpy as np
 
 from tests.pipelines.nightly.studies import faults
 from tests.pipelines.nightly.studies.reading import Reading, Views
-from tests.pipelines.nightly.studies.simulated_nights import OTHER, Planted, failed, is_worse, pinned_only, run
+from tests.pipelines.nightly.studies.simulated_nights import OTHER, Planted, Stage, failed, is_worse, pinned_only
 
 LEAST = 0.95
 DRIFT_PX, DRIFT_NIGHTS = 0.0001, 30
@@ -23,14 +23,19 @@ class Share:
     right: float  # name the slice that the fault is in, and no other lens
 
 
-def share(pool, poses, planted, noise, nights, seed=0):
-    """Shares over nights with seeds from `seed` on."""
+def stages(pool, poses, noise, nights):
+    """So many nights to plant faults in."""
+    return [Stage(pool, poses, noise, (poses, i)) for i in range(nights)]
+
+
+def share(nights, planted):
+    """Of nights that a fault is planted in."""
     caught = right = 0
-    for i in range(nights):
-        night = run(pool, poses, planted, noise, np.random.default_rng((seed, i)))
+    for stage in nights:
+        night = stage.night(planted)
         caught += is_worse(night)
         right += is_worse(night) and _is_right(planted, night)
-    return Share(nights, caught / nights, right / nights)
+    return Share(len(nights), caught / len(nights), right / len(nights))
 
 
 def _is_right(planted, night):
@@ -42,16 +47,16 @@ def _is_right(planted, night):
     return planted.fault.is_named_by(named)
 
 
-def smallest(pool, poses, planted_of, noise, nights, low, high, steps=5):
-    """The smallest size of 2**steps geometric ones between `low` and `high` that is caught often enough, by bisection.
+def smallest(nights, fault, low, high, steps=5):
+    """The smallest of 2**steps geometric sizes between `low` and `high` that is caught often enough, by bisection.
 
-    planted_of: a size to what is planted. None if even `high` is not caught.
+    None if even `high` is not.
     """
-    if share(pool, poses, planted_of(high), noise, nights).caught < LEAST:
+    if share(nights, Planted(fault, high)).caught < LEAST:
         return None
     for _ in range(steps):
         middle = float(np.sqrt(low * high))
-        if share(pool, poses, planted_of(middle), noise, nights).caught < LEAST:
+        if share(nights, Planted(fault, middle)).caught < LEAST:
             low = middle
         else:
             high = middle
@@ -72,8 +77,3 @@ def _first_night(pool, poses, noise, rng):
         if is_worse(pinned_only(old, new.slices())):
             return night
     return 0
-
-
-def of_fault(fault):
-    """A size to what is planted."""
-    return lambda size: Planted(fault, size)

@@ -29,6 +29,7 @@ class Views:
     draw: np.ndarray  # (R, p, C)
     noise_px: np.ndarray  # (p, N, 2) of the setting `truth+noise`, shared by the cameras of a pose
     noisy: dict = field(default_factory=dict)  # by camera, that setting's measures, the same for both sides
+    clean: dict = field(default_factory=dict)  # by camera, its slices without a fault
 
     @classmethod
     def drawn(cls, pool, poses, rng):
@@ -76,16 +77,23 @@ class Reading:
         return self.changed[camera]
 
     def slices(self):
-        """The measures as the gates take them."""
+        """The measures as the gates take them; without a fault the same objects again and again."""
         found = []
         for camera in range(len(self.views.pool.cameras)):
-            values = self._clean(camera) if camera not in self.changed else self._changed(camera)
-            found += [
-                self._slice(regime, camera, system, own)
-                for regime in range(len(REGIMES))
-                for system, own in values.items()
-            ]
+            if camera in self.changed:
+                found += self._of_camera(camera, self._changed(camera))
+            elif any(camera == seen for _, _, seen in self.failed):
+                found += self._of_camera(camera, self._clean(camera))
+            else:
+                if camera not in self.views.clean:
+                    self.views.clean[camera] = self._of_camera(camera, self._clean(camera))
+                found += self.views.clean[camera]
         return found
+
+    def _of_camera(self, camera, values):
+        return [
+            self._slice(regime, camera, system, own) for regime in range(len(REGIMES)) for system, own in values.items()
+        ]
 
     def _clean(self, camera):
         at = self.views.at(camera)

@@ -11,6 +11,9 @@ import datetime
 from dataclasses import dataclass
 from unittest import mock
 
+import numpy as np
+
+from pipelines.nightly import judgement
 from pipelines.nightly.gates import accuracy, failures, fresh, speed, tail
 from pipelines.nightly.judgement import judge_slices
 from pipelines.nightly.other_code import ROOT, Code
@@ -33,27 +36,57 @@ class Planted:
     slower: float = 0.0  # share by which detection takes longer
 
 
-def run(pool, poses, planted, noise, rng):
-    """One night. noise: SAME or OTHER."""
+class Stage:
+    """One night that is judged again with every fault: its pictures, and what does not depend on the fault.
 
-    def pair(count, alpha):
-        views = Views.drawn(pool, count, rng)
-        old = Reading(views)
-        new = Reading(views if noise == SAME else views.with_other_noise(rng))
+    noise: SAME or OTHER. Comparisons of two slices that no fault touches are made once.
+    """
+
+    def __init__(self, pool, poses, noise, seed):
+        self.rng, self.pairs, self.compared = np.random.default_rng(seed), [], {}
+        for count in (poses, FRESH_POSES, FRESH_POSES):  # pinned, fresh, and the second look
+            views = Views.drawn(pool, count, self.rng)
+            self.pairs.append((views, views if noise == SAME else views.with_other_noise(self.rng)))
+        self.seed = seed
+
+    def night(self, planted):
+        """The night with a fault in the candidate."""
+        rng = np.random.default_rng((*self.seed, 1))
+        with mock.patch.multiple(judgement, _changes=self._once(judgement._changes)):
+            sides, pinned = self._judged(0, planted, accuracy.ALPHA, rng)
+            tonight = self._judged(1, planted, fresh.ALPHA, rng)[1]
+            return _night(
+                accuracy.judge(pinned, nobody),
+                fresh.judge(tonight, lambda: self._judged(2, planted, fresh.ALPHA, rng)[1], nobody),
+                failures.judge(pinned, tonight, nobody),
+                tail.judge_slices(*sides, nobody),
+                speed.judge(timings(rng, planted.slower), nobody),
+            )
+
+    def _judged(self, which, planted, alpha, rng):
+        old, new = (Reading(views) for views in self.pairs[which])
         if planted.fault is not None:
             planted.fault.plant(new, planted.size, rng)
         sides = old.slices(), new.slices()
         return sides, judge_slices(*sides, alpha, paired=True)
 
-    sides, pinned = pair(poses, accuracy.ALPHA)
-    tonight = pair(FRESH_POSES, fresh.ALPHA)[1]
-    return _night(
-        accuracy.judge(pinned, nobody),
-        fresh.judge(tonight, lambda: pair(FRESH_POSES, fresh.ALPHA)[1], nobody),
-        failures.judge(pinned, tonight, nobody),
-        tail.judge_slices(*sides, nobody),
-        speed.judge(timings(rng, planted.slower), nobody),
-    )
+    def _once(self, real):
+        kept = {id(item) for pair in self.pairs for views in pair for own in views.clean.values() for item in own}
+
+        def changes(old, new, paired):
+            if id(old) not in kept or id(new) not in kept:
+                return real(old, new, paired)
+            key = id(old), id(new)
+            if key not in self.compared:
+                self.compared[key] = real(old, new, paired)
+            return self.compared[key]
+
+        return changes
+
+
+def run(pool, poses, planted, noise, seed):
+    """One night of its own."""
+    return Stage(pool, poses, noise, seed).night(planted)
 
 
 def pinned_only(old, new):

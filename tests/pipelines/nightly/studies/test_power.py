@@ -17,55 +17,49 @@ from tests.pipelines.nightly.studies import early_ends, faults, found, power
 from tests.pipelines.nightly.studies import pool as pools
 from tests.pipelines.nightly.studies.pages import power_page
 from tests.pipelines.nightly.studies.reading import ALL, NOISY, Reading, Views
-from tests.pipelines.nightly.studies.simulated_nights import OTHER, SAME, Planted
+from tests.pipelines.nightly.studies.simulated_nights import OTHER, SAME, Planted, Stage
 
 NIGHTS, TRIES = 200, 40  # of a share; of a step of the search for the smallest size
 SIZES, NOISES = (20, 80), (SAME, OTHER)
 STEPS = 4
 SLOWER = 0.15
 PLANTED = (faults.CORNER_BIAS, faults.MORE_NOISE, faults.CIRCLE, faults.FOCAL, faults.COVARIANCE, faults.SHIFT)
+ALL_PLANTED = (
+    *((fault.name, Planted(fault, fault.size)) for fault in PLANTED),
+    ("slower detection", Planted(slower=SLOWER)),
+    ("new failure", Planted(faults.FAILURE, 1)),
+)
+SEARCHES = ((20, SAME, 8, 5), (20, OTHER, TRIES, 5), (80, OTHER, TRIES, 5))
 
 
-def _shares(pool, planted):
-    return {
-        f"{noise} {poses}": dataclasses.asdict(power.share(pool, poses, planted, noise, NIGHTS))
-        for poses in SIZES
-        for noise in NOISES
-    }
+@pytest.mark.slow
+@pytest.mark.parametrize("poses", SIZES)
+@pytest.mark.parametrize("noise", NOISES)
+def test_power(poses, noise):
+    """Every fault in the same 200 nights."""
+    begun, pool = time.process_time(), pools.pool()
+    counts = {name: [0, 0] for name, _ in ALL_PLANTED}
+    for i in range(NIGHTS):
+        nights = [Stage(pool, poses, noise, (poses, i))]
+        for name, planted in ALL_PLANTED:
+            one = power.share(nights, planted)
+            counts[name] = [counts[name][0] + one.caught, counts[name][1] + one.right]
+    rows = {name: [value / NIGHTS for value in both] for name, both in counts.items()}
+    found.keep(f"power-{noise} {poses}", {"shares": rows, "processor_s": time.process_time() - begun})
+    power_page()
+    assert noise == OTHER or all(caught >= power.LEAST for caught, _ in rows.values())
 
 
-def _smallest(pool, fault):
+@pytest.mark.slow
+@pytest.mark.parametrize(("poses", "noise", "tries", "steps"), SEARCHES)
+def test_smallest_size(poses, noise, tries, steps):
     """On the same pictures nothing scatters, so that few nights tell."""
-    low, high = fault.size / 16.0, fault.size * 4.0
-    return {
-        f"{noise} {poses}": power.smallest(pool, poses, power.of_fault(fault), noise, tries, low, high, steps)
-        for poses, noise, tries, steps in ((20, SAME, 10, 6), (20, OTHER, TRIES, 5), (80, OTHER, TRIES, 5))
-    }
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("fault", PLANTED, ids=lambda fault: fault.name)
-def test_power(fault):
-    begun, pool = time.process_time(), pools.pool()
-    rows = {"name": fault.name, "unit": fault.unit, "size": fault.size}
-    rows |= {"shares": _shares(pool, Planted(fault, fault.size)), "smallest": {}}
-    found.keep(f"power-{fault.name}", rows | {"processor_s": time.process_time() - begun})
-    rows |= {"smallest": _smallest(pool, fault)}
-    found.keep(f"power-{fault.name}", rows | {"processor_s": time.process_time() - begun})
+    begun = time.process_time()
+    nights = power.stages(pools.pool(), poses, noise, tries)
+    rows = {fault.name: power.smallest(nights, fault, fault.size / 16.0, fault.size * 4.0, steps) for fault in PLANTED}
+    kept = {"smallest": rows, "processor_s": time.process_time() - begun}
+    found.keep(f"power-smallest-{noise} {poses}", kept)
     power_page()
-    assert all(item["caught"] >= power.LEAST for key, item in rows["shares"].items() if key.startswith(SAME))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["slower detection", "new failure"])
-def test_power_of_the_other_gates(kind):
-    begun, pool = time.process_time(), pools.pool()
-    planted = Planted(slower=SLOWER) if kind == "slower detection" else Planted(faults.FAILURE, 1)
-    rows = {"name": kind, "unit": "share" if planted.slower else "frames", "size": planted.slower or 1}
-    rows |= {"shares": _shares(pool, planted), "smallest": {}}
-    found.keep(f"power-{kind}", rows | {"processor_s": time.process_time() - begun})
-    power_page()
-    assert all(item["caught"] >= power.LEAST for item in rows["shares"].values())
 
 
 @pytest.mark.slow
@@ -74,9 +68,9 @@ def test_power_of_an_early_end():
     begun, pool = time.process_time(), pools.pool()
     moves = early_ends.moves(pool, STEPS)
     fault = faults.Fault("early end", "steps", 1, faults.early_end(moves), faults.POSES, everywhere=True)
-    rows = []
+    rows, nights = [], power.stages(pool, SIZES[0], SAME, NIGHTS)
     for steps in range(1, STEPS + 1):
-        shares = power.share(pool, SIZES[0], Planted(fault, steps), SAME, NIGHTS)
+        shares = power.share(nights, Planted(fault, steps))
         rows.append({"steps": steps, "off": _off(pool, moves, steps)} | dataclasses.asdict(shares))
     found.keep("power-early-end", {"rows": rows, "processor_s": time.process_time() - begun})
     power_page()
@@ -108,36 +102,32 @@ def test_power_of_a_drift(poses):
 
 @pytest.fixture(scope="module")
 def synthetic():
-    return pools.synthetic(24, np.random.default_rng(0))
+    pool = pools.synthetic(24, np.random.default_rng(0))
+    return pool, power.stages(pool, 20, SAME, 3)
 
 
-@pytest.mark.parametrize("fault", PLANTED, ids=lambda fault: fault.name)
-def test_a_planted_fault_is_caught_where_it_is(synthetic, fault):
+@pytest.mark.parametrize(("name", "planted"), ALL_PLANTED)
+def test_a_planted_fault_is_caught_where_it_is(synthetic, name, planted):
     """Three nights on the same pictures, where nothing but chance in the fault scatters."""
-    assert power.share(synthetic, 20, Planted(fault, fault.size), SAME, 3) == power.Share(3, 1.0, 1.0)
-
-
-def test_slower_detection_and_a_new_failure_are_caught(synthetic):
-    assert power.share(synthetic, 20, Planted(slower=SLOWER), SAME, 3) == power.Share(3, 1.0, 1.0)
-    assert power.share(synthetic, 20, Planted(faults.FAILURE, 1), OTHER, 3) == power.Share(3, 1.0, 1.0)
+    assert power.share(synthetic[1], planted) == power.Share(3, 1.0, 1.0), name
 
 
 def test_a_drift_is_caught_at_the_latest_when_it_passes_the_margin(synthetic):
     """Corners are 0.0005 px off after five nights; poses, which average them, may tell sooner."""
-    (night,) = power.drift_nights(synthetic, 20, SAME, 1)
+    (night,) = power.drift_nights(synthetic[0], 20, SAME, 1)
     assert 1 <= night <= 6
 
 
 def test_poses_to_first_order_are_the_solvers(synthetic):
     """Components over their deviations to 0.01: errors of the second order in 0.005 px, or in 0.4 px, over 2 m."""
-    recipe = pools.recipe_of(pools.REGIMES[0])
-    views = Views.drawn(synthetic, 24, np.random.default_rng(1))
+    recipe, pool = pools.recipe_of(pools.REGIMES[0]), synthetic[0]
+    views = Views.drawn(pool, 24, np.random.default_rng(1))
     slices = {(item.camera, item.system): item for item in Reading(views).slices() if item.regime == pools.REGIMES[0]}
     for frame in plan(recipe)[:10]:
         camera, truth = frame.camera.true_camera(), frame.cam_from_obj
         at = 0, views.draw[0, frame.pose_id, frame.frame_id % 5], frame.pose_id, frame.frame_id % 5
         for system, error, sigma in (
-            (ALL, synthetic.error[at], synthetic.covariance[at]),
+            (ALL, pool.error[at], pool.covariance[at]),
             (NOISY, views.noise_px[frame.pose_id], 0.4),
         ):
             pixels = camera.project(truth.apply(recipe.target.points)) + error
