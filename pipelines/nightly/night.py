@@ -16,6 +16,7 @@ from pipelines.nightly import suites
 from pipelines.nightly.accepted import Baseline
 from pipelines.nightly.baselines import FILE_NAME, Baselines, load
 from pipelines.nightly.desk import Desk, Request, code_of
+from pipelines.nightly.differences import other_code, other_machine
 from pipelines.nightly.found import BASELINE, RAN, Found
 from pipelines.nightly.fresh_pictures import judge_fresh
 from pipelines.nightly.gates import accuracy, data, failures, fresh, regenerate, replay, speed, tail
@@ -127,14 +128,22 @@ def _judge_data(
     with found.at_gate(data.GATE):
         found.outcomes.append(data.judge(found.data[suites.PINNED], baseline.pinned_data))
     with found.at_gate(regenerate.GATE):
-        of_baseline = {item["name"]: item["value"] for item in desk.history.run(baseline.run)["facts"]}
-        same = all(of_baseline.get(name) == value for name, value in machine())
         found.again += [item for name, dataset in pictures.items() for item in regenerate.render_again(name, dataset)]
-        found.outcomes.append(regenerate.judge(found.again, same))
+        facts = _mapping(desk.history.run(baseline.run)["facts"])
+        found.outcomes.append(regenerate.judge(found.again, other_machine(facts, dict(machine()))))
     with found.at_gate(replay.GATE):
-        known = {item["name"]: item["value"] for item in desk.history.run(baseline.run)["data"]}
+        run = desk.history.run(baseline.run)
+        known, facts = _mapping(run["data"]), _mapping(run["facts"])
         old = {name.removeprefix("replay "): value for name, value in known.items() if name.startswith("replay ")}
-        found.outcomes.append(replay.judge(old, replayed))
+        moved = replay.largest_change(
+            desk.history.measures(baseline.measures[suites.PINNED]), found.measures[f"{suites.PINNED} new"]
+        )
+        reasons = (*other_machine(facts, dict(machine())), *other_code(known.get("code"), found.data["code"]))
+        found.outcomes.append(replay.judge(old, replayed, moved, reasons))
+
+
+def _mapping(pairs: list[dict[str, str]]) -> dict[str, str]:
+    return {item["name"]: item["value"] for item in pairs}
 
 
 def _judge_numbers(desk: Desk, pictures: dict[str, Dataset], baseline: Baseline, found: Found) -> None:

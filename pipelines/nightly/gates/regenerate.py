@@ -7,6 +7,7 @@ about.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,18 +74,20 @@ def render_again(suite: str, dataset: Dataset, count: int = FRAMES) -> list[Agai
     return found
 
 
-def judge(again: list[Again], same_machine: bool) -> Outcome:
-    """same_machine: processor and versions are those that the pinned pictures were made with."""
-    grey, points = (0, 0.0) if same_machine else (GREY_LEVELS, POINTS_PX)
+def judge(again: list[Again], reasons: Sequence[str]) -> Outcome:
+    """reasons: versions, processor and kernel that are not those that the pinned pictures were made with."""
+    grey, points = (GREY_LEVELS, POINTS_PX) if reasons else (0, 0.0)
     other = [item for item in again if item.grey_levels > grey or not item.points_px <= points]
+    because = f"; {'; '.join(reasons)}" if reasons else ""
     if other:
         worst = max(other, key=lambda item: (item.grey_levels, item.points_px))
         told = (
             f"{len(other)} of {len(again)} pinned frames come out otherwise, frame {worst.frame_id} of {worst.suite} "
-            f"by {worst.grey_levels} grey levels and {worst.points_px:.2g} px"
+            f"by {worst.grey_levels} grey levels and {worst.points_px:.2g} px{because}"
         )
         frames = tuple((item.suite, item.frame_id) for item in other)
         return Outcome(GATE, State.FAILED, told, Exit.NO_VERDICT, frames=frames)
     if any(item.differs for item in again):
-        return Outcome(GATE, State.CHANGED, f"{len(again)} frames come out within one grey level on this other machine")
-    return Outcome(GATE, State.PASSED, f"{len(again)} pinned frames, rendered again, are the same bits")
+        return Outcome(GATE, State.CHANGED, f"{len(again)} pinned frames come out within one grey level{because}")
+    state = State.CHANGED if reasons else State.PASSED
+    return Outcome(GATE, state, f"{len(again)} pinned frames, rendered again, are the same bits{because}")
