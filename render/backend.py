@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any
 
 MINIMUM_LLVM = 19
-CPU_VARIANT = "llvm_ad_mono"
-CUDA_VARIANT = "cuda_ad_mono"
+CPU_VARIANT = "llvm_ad_rgb"
+CUDA_VARIANT = "cuda_ad_rgb"
 VARIANTS = (CPU_VARIANT, CUDA_VARIANT)
 SYSTEM_FOLDERS = (  # below /, with wildcards
     "usr/lib", "usr/local/lib", "opt/homebrew/opt/llvm/lib", "usr/lib/*-linux-gnu*", "usr/lib/llvm-*/lib",
@@ -85,7 +85,7 @@ def cuda_present() -> bool:
 def load() -> Any:  # Any: the attributes of the module are those of the variant that it is set to
     """Mitsuba with its variant fixed for this process.
 
-    `EPOSIT_VARIANT` chooses between llvm_ad_mono and cuda_ad_mono; without it a CUDA GPU is used where there is one.
+    `EPOSIT_VARIANT` chooses between llvm_ad_rgb and cuda_ad_rgb; without it a CUDA GPU is used where there is one.
 
     Raises:
         BackendError: unknown variant, no usable LLVM, or another variant already runs in this process.

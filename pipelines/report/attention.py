@@ -22,6 +22,7 @@ def attention(run: Run) -> Iterator[str]:
     """A sentence without its full stop for each; none if the run is as it should be."""
     for item in run.points:
         yield from _not_found(run, item)
+        yield from _made_up(run, item)
     for item in run.found:
         yield from _failures(item)
     for item in run.points:
@@ -32,7 +33,7 @@ def attention(run: Run) -> Iterator[str]:
 
 def _not_found(run: Run, item: PointErrors) -> Iterator[str]:
     seen = np.isfinite(item.error[..., 0])
-    lost = ~np.any(seen[:, :-1], axis=1)
+    lost = ~np.any(seen[:, :-1], axis=1) & np.any(item.in_image, axis=1)
     if np.any(lost):
         yield f"{item.detector} found no board in {counted(int(lost.sum()), 'frame')}: {_named(run, lost)}"
     missing = item.in_image[:, :-1] & ~seen[:, :-1] & ~lost[:, None]
@@ -44,6 +45,13 @@ def _not_found(run: Run, item: PointErrors) -> Iterator[str]:
     if np.any(circles):
         told = f"{item.detector} found the board and not the circle in {counted(int(circles.sum()), 'frame')}"
         yield f"{told}: {_named(run, circles)}"
+
+
+def _made_up(run: Run, item: PointErrors) -> Iterator[str]:
+    frames = np.any(item.made_up, axis=1)
+    if np.any(frames):
+        told = f"{item.detector} found {counted(int(item.made_up.sum()), 'point')} that cannot be seen, in "
+        yield told + f"{counted(int(frames.sum()), 'frame')}: {_named(run, frames)}"
 
 
 def _failures(item: Series) -> Iterator[str]:

@@ -14,6 +14,7 @@ from datasets.rows import numbers
 from datasets.schema import COMPONENTS
 from eposit import Status
 from eposit.arrays import Array, Mask
+from pipelines.stages.failures import HIDDEN
 from pipelines.statistics import FEW, Interval, bootstrap, median, rate, student, tail
 
 ERRORS = {
@@ -41,13 +42,13 @@ class Series:
     frame_id: NDArray[np.int64]
     errors: dict[str, Array]  # column to values, NaN for failures
     normalised: Array  # (n, 6) errors over their stated standard deviations, NaN without
-    status: NDArray[np.str_]
+    status: NDArray[np.str_]  # HIDDEN where no pose could be found, as the target cannot be seen
     gross: Mask
 
     @property
     def failed(self) -> Mask:
-        """Rows without a pose."""
-        return self.status != Status.OK
+        """Rows without a pose, of a target that can be seen."""
+        return (self.status != Status.OK) & (self.status != HIDDEN)
 
     @property
     def position_mm(self) -> Array:
@@ -90,7 +91,8 @@ def series(scores: pa.Table) -> list[Series]:
     for key in dict.fromkeys(keys):
         part = scores.filter(pa.array([other == key for other in keys]))
         errors = dict(zip(ERRORS, numbers(part, *ERRORS).T, strict=True))
-        status = part["status"].to_numpy(zero_copy_only=False).astype(str)
+        outcome = zip(part["status"].to_pylist(), part["failure_reason"].to_pylist(), strict=True)
+        status = np.array([HIDDEN if reason == HIDDEN else status for status, reason in outcome], str)
         gross = np.array(part["gross_failure"].to_pylist())
         normalised = numbers(part, *(f"{component}_normalised" for component in COMPONENTS))
         named: dict[str, str] = dict(zip(SETTING, key, strict=True))

@@ -60,11 +60,15 @@ def _rendered(run: Run) -> str:
 
 def _detected(run: Run, item: PointErrors) -> Iterator[str]:
     seen = np.isfinite(item.error[..., 0])
-    boards, corners, circles = np.any(seen[:, :-1], axis=1), seen[:, :-1] & item.in_image[:, :-1], seen[:, -1]
-    there = item.in_image[:, :-1]
+    visible = np.any(item.in_image, axis=1)
+    boards, corners = np.any(seen[visible, :-1], axis=1), seen[:, :-1] & item.in_image[:, :-1]
+    circles, there = seen[item.in_image[:, -1], -1], item.in_image[:, :-1]
+    if not len(boards):
+        yield f"{item.detector} had no board to find: none can be seen."
+        return
     yield (
         f"{item.detector} found {np.sum(boards)} of {counted(len(boards), 'board')} ({share(wilson(boards))}), "
-        f"{np.sum(corners)} of the {counted(int(np.sum(there)), 'corner')} that lie in the pictures, and "
+        f"{np.sum(corners)} of the {counted(int(np.sum(there)), 'corner')} that can be seen, and "
         f"{np.sum(circles)} of {counted(len(circles), 'circle')}."
     )
     if not np.any(boards):

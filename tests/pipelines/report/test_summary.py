@@ -28,7 +28,7 @@ def _points(seed):
     error = SIGMA * normalised
     return PointErrors(
         "edge-fit", error, normalised, np.sum(error * radius, axis=-1), error[..., 0], np.zeros(shape),
-        np.full(shape, 30.0), np.ones(shape, bool), np.full(shape, "ok"),
+        np.full(shape, 30.0), np.ones(shape, bool), np.zeros(shape, bool), np.full(shape, "ok"),
     )  # fmt: skip
 
 
@@ -60,7 +60,7 @@ def test_a_run_as_it_should_be_is_told_in_sentences():
     rendered, boards, corners, poses, failed = found.facts
     assert rendered == "16 frames rendered: 8 poses through 2 cameras (perspective, equisolid), sensor regime clean."
     assert boards == (
-        "edge-fit found 16 of 16 boards (100 [80.6, 100] %), 864 of the 864 corners that lie in the pictures, and 16 "
+        "edge-fit found 16 of 16 boards (100 [80.6, 100] %), 864 of the 864 corners that can be seen, and 16 "
         "of 16 circles."
     )
     # The planted deviation, and errors as large as stated; 1728 values know them to 2 %.
