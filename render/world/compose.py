@@ -86,9 +86,9 @@ def load_scene(
     return _loaded(composition.objects), composition
 
 
-def load_objects(objects: Objects) -> DeviceScene:
-    """A scene of objects in the object frame."""
-    return _loaded(_in_scene(objects, np.eye(4)))
+def load_objects(objects: Objects, matrix: Array | None = None) -> DeviceScene:
+    """A scene of objects of the object frame. matrix: (4, 4) to the scene's frame; None if that is the same."""
+    return _loaded(_in_scene(objects, np.eye(4) if matrix is None else matrix))
 
 
 def _loaded(objects: Objects) -> DeviceScene:

@@ -170,4 +170,4 @@ def test_a_picture_that_cannot_be_read_names_the_shard(own, root, cli):
 
     put_image(root, b"not a PNG")
     done = cli("estimate", root, "--estimator", f"{own(FUNCTIONS)}:none", "-q")
-    assert_one_sentence(done.code, done.err, "the image is not an 8-bit grey PNG")
+    assert_one_sentence(done.code, done.err, "the image is not an 8-bit PNG, grey or in colour")
