@@ -78,9 +78,9 @@ def test_the_files_are_written_and_the_table_keeps_its_columns(tmp_path, capsys)
     html = page.read_text()
     page_of_paper = Page(html)
     assert len(page_of_paper.of("svg")) == 1
-    assert re.fullmatch(r"Of 4 claims .*\.", page_of_paper.of("h1")[0].text)
+    assert re.fullmatch(r"Of 6 claims .*\.", page_of_paper.of("h1")[0].text)
     claims_table, *tables = page_of_paper.of("table")
-    assert len(page_of_paper.inside(claims_table, "tbody")) == 4
+    assert len(page_of_paper.inside(claims_table, "tbody")) == 6
     assert all(page_of_paper.inside(table, "caption") for table in tables)
     assert "Stability to the principal point" in html
     rows = [line for line in claims.read_text().splitlines() if line.startswith("|")]
