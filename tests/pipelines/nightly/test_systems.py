@@ -16,6 +16,7 @@ from pipelines.nightly.acceptance import accept_baseline
 from pipelines.nightly.accepted import Waiver
 from pipelines.nightly.baselines import FILE_NAME
 from pipelines.nightly.history import History
+from pipelines.nightly.other_code import CHOOSE_CODE, ROOT, Code, OtherCodeError
 from pipelines.nightly.systems import asked
 from tests.conftest import command
 
@@ -294,3 +295,20 @@ def test_a_time_limit_is_a_time(given, tmp_path, cli):
     done = cli(*QUICK, "--time-limit", given, "--history", tmp_path)
     assert (done.code, done.err.count("\n")) == (2, 1)
     assert "give seconds above 0" in done.err
+
+
+def test_the_frozen_copy_answers_and_not_the_current_folder(tmp_path, monkeypatch):
+    """Also for what it imports, after the function has been looked up as `estimate` does."""
+    for place in ("copy", "today"):
+        (tmp_path / place).mkdir()
+        (tmp_path / place / "mine.py").write_text(MINE)
+        (tmp_path / place / "helper.py").write_text("solve = None\n")
+    monkeypatch.chdir(tmp_path / "today")
+    program = "from pipelines.adapters.user import load_function\nload_function('mine:solve', '--solver')\n"
+    program += "print(*(sys.modules[name].__file__ for name in ('mine', 'helper')))\n"
+    code = Code(ROOT, user=("mine", tmp_path / "copy"))
+    said = code.run_program(CHOOSE_CODE + program, what="where").stdout.split()
+    assert said == [str(tmp_path / "copy" / name) for name in ("mine.py", "helper.py")]
+    (tmp_path / "copy" / "mine.py").unlink()
+    with pytest.raises(OtherCodeError, match="mine is None, not in"):
+        code.run_program(CHOOSE_CODE, what="where")
