@@ -68,9 +68,10 @@ def time_both(old: Code, new: Code, folders: tuple[Path, Path], frames: int, tur
         found: list[dict[str, float]] = []
         while len(found) < 4 * MOST_TURNS:
             found += [_turn(process) for _ in range(turns) for process in (before, after, after, before)]
-            old_s, new_s = _seconds(found[0::4], found[3::4]), _seconds(found[1::4], found[2::4])
+            old_s, new_s = _sides(found)
             if np.all(np.std(new_s / old_s, axis=0, ddof=1) <= KNOWN * np.sqrt(len(old_s))):
                 break
+    old_s, new_s = _sides(found)
     return [_timing(stage, old_s[:, i], new_s[:, i], frames) for i, stage in enumerate(STAGES)]
 
 
@@ -95,6 +96,11 @@ def _timing(stage: str, old_s: np.ndarray, new_s: np.ndarray, frames: int) -> Ti
     per_frame = 1000.0 / frames
     ratio, low, high = float(np.median(ratios)), float(ratios.min()), float(ratios.max())
     return Timing(stage, ratio, low, high, float(np.median(old_s)) * per_frame, float(np.median(new_s)) * per_frame)
+
+
+def _sides(found: Sequence[dict[str, float]]) -> tuple[np.ndarray, np.ndarray]:
+    """(turns, stages) seconds of the baseline's and of the candidate's code, from turns in the order ABBA."""
+    return _seconds(found[0::4], found[3::4]), _seconds(found[1::4], found[2::4])
 
 
 def _seconds(first: Sequence[dict[str, float]], second: Sequence[dict[str, float]]) -> np.ndarray:
