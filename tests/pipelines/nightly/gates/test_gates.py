@@ -1,5 +1,6 @@
 """Each gate by itself: every state that it can end in, and what it tells."""
 
+import contextlib
 import dataclasses
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from pipelines.nightly.differences import other_code, other_machine
 from pipelines.nightly.gates import accuracy, data, failures, fresh, regenerate, replay, speed, tail
 from pipelines.nightly.judgement import Failures, judge
+from pipelines.nightly.other_code import ROOT, Code
 from pipelines.nightly.record import Exit, State, Timing
 from render.targets.image_region import Region
 from tests.pipelines.nightly import simulated
@@ -244,3 +246,23 @@ def test_speed_is_waived_only_if_every_slow_stage_is():
     slow = [Timing(stage, 1.2, 1.1, 1.3, 1.0, 1.2) for stage in ("detect", "estimate")]
     assert speed.judge(slow, lambda stage: stage == "detect").state is State.FAILED
     assert speed.judge(slow, everybody).state is State.WAIVED
+
+
+@pytest.mark.parametrize("scatter", [0.01, 0.3])
+def test_speed_takes_more_turns_where_times_scatter(scatter, monkeypatch):
+    """One turn scatters by 1 %, or by 30 %, far more than on a crowded machine: a quarter is told from nothing."""
+    rng, taken = np.random.default_rng(5), []
+
+    def turn(factor):
+        taken.append(factor)
+        return {stage: factor * rng.lognormal(0.0, scatter) for stage in speed.STAGES}
+
+    for slower, state in ((1.0, State.PASSED), (1.25, State.FAILED)):
+        factors = iter((1.0, slower))
+        monkeypatch.setattr(speed, "_running", lambda *_, own=factors: contextlib.nullcontext(next(own)))
+        monkeypatch.setattr(speed, "_turn", turn)
+        taken.clear()
+        found = speed.time_both(Code(ROOT), Code(ROOT), (ROOT, ROOT), 20)
+        assert speed.judge(found, nobody).state is state
+        turns = (len(taken) - 2) // 4  # but for the first of each process
+        assert turns == speed.TURNS if scatter == 0.01 else speed.TURNS < turns <= speed.MOST_TURNS
