@@ -3,7 +3,8 @@
 Wall time of a shared machine scatters by 9 % from night to night, whatever it is divided by. Processor time of two
 processes that work alternately on the same frames scatters by 1 % on an idle machine, and by 6 % where many processes
 share a core. So turns go on until their ratio is known well enough to judge by. Each process warms up first, so that
-neither compiling nor loading counts. A user's function is called again within a turn until that takes long enough to be timed.
+neither compiling nor loading counts. A user's function is called again within a turn until that takes long enough to be
+timed.
 """
 
 from __future__ import annotations
@@ -130,6 +131,11 @@ def _timing(stage: str, old_s: np.ndarray, new_s: np.ndarray, frames: int) -> Ti
     per_frame = 1000.0 / frames
     ratio, low, high = float(np.median(ratios)), float(ratios.min()), float(ratios.max())
     return Timing(stage, ratio, low, high, float(np.median(old_s)) * per_frame, float(np.median(new_s)) * per_frame)
+
+
+def _sides(found: Sequence[dict[str, float]], stages: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+    """(turns, stages) seconds of the baseline's and of the candidate's code, from turns in the order ABBA."""
+    return _seconds(found[0::4], found[3::4], stages), _seconds(found[1::4], found[2::4], stages)
 
 
 def _sides(found: Sequence[dict[str, float]], stages: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:

@@ -133,7 +133,7 @@ def _real_table(parts):
     rows = []
     for (fault, size), nights in of.items():
         right = sum(row["right"] and not row["other_lens"] for row in nights) if "right" in nights[0] else "-"
-        shown = f"night {', '.join(str(row['size']) for row in nights)}" if fault == "drift" else size
+        shown = f"night {', '.join(str(row['size']) for row in nights)}" if fault == "drift" else SIZES.get(fault, size)
         rows.append([fault, shown, len(nights), sum(row["exit"] == 1 for row in nights), right, nights[0]["sentence"]])
     return table(["fault", "size", "nights", "exit code 1", "right slice", "what the first of them says"], rows)
 
