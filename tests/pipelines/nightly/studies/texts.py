@@ -27,7 +27,7 @@ all of their tests together: five lenses, two regimes, a detector and three sett
 In each cell: share of 200 nights that catch the fault, share that also name the right slice.
 """
 SMALLEST = f"""
-By bisection over the size: 10 nights a step for {SAME}, of which all must catch it, 40 for {OTHER}, of which 95
+By bisection over the size: 8 nights a step for {SAME}, of which all must catch it, 40 for {OTHER}, of which 95
 % must. The size is found within a factor of 1.2; 95 % of 40 nights are known within 7 %. On the same pictures
 the margins decide, or, sooner, what the poses make of the points.
 """
