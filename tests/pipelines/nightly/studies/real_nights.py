@@ -22,10 +22,12 @@ from datasets.rows import decode_image, points_by_frame
 from datasets.store.claim import claim
 from datasets.store.reuse import share_pictures
 from pipelines.engines.local import LocalEngine
-from pipelines.nightly import night, suites
+from pipelines.nightly import night, reading, suites
 from pipelines.nightly.acceptance import accept_baseline
+from pipelines.nightly.desk import Request
 from pipelines.nightly.gates import speed
 from pipelines.nightly.other_code import ROOT
+from pipelines.nightly.systems import Systems
 from pipelines.stages import detect, estimate
 from tests.pipelines.nightly.studies.steps import earlier, recorded
 
@@ -50,7 +52,7 @@ class Studio:
 
     def __init__(self, folder: Path, poses: int = POSES):
         self.folder, self.poses, self.known, self.solved, self.old = folder, poses, {}, {}, {}
-        self.make, self.read_by = suites.Suite.make, suites.read_by
+        self.make, self.read_old = suites.Suite.make, reading.Frozen.read
         self.assumed, self.solve_with, self.detect_points = estimate.assumed, estimate.solve_with, detect.detect_points
 
     def history(self, number):
@@ -69,14 +71,16 @@ class Studio:
         """Run one night and return it."""
         root, recipe = self.folder / f"history-{number}", self.folder / f"nightly-{number}.toml"
         with self._planted(fault):
-            return night.run_night(night.Request(str(recipe), root, ("typical",), seed, without=without), QUIET)
+            return night.run_night(
+                Request(str(recipe), root, ("typical",), seed, Systems(suites.READ), without=without), QUIET
+            )
 
     @contextmanager
     def _planted(self, fault):
         with ExitStack() as stack:
             for place, name, own in (
                 (suites.Suite, "make", functools.partialmethod(_made, self)),
-                (suites, "read_by", self._read_by),
+                (reading.Frozen, "read", functools.partialmethod(_read_old, self)),
                 (detect, "detect_points", functools.partial(self._detect, fault)),
                 (estimate, "assumed", functools.partial(self._assumed, fault)),
                 (estimate, "solve_with", functools.partial(self._solve, fault)),
@@ -85,12 +89,6 @@ class Studio:
             ):
                 stack.enter_context(mock.patch.object(place, name, own))
             yield
-
-    def _read_by(self, code, pictures, folder, settings, workers):
-        key = suites.pictures_digest(pictures)
-        if key not in self.old:
-            self.old[key] = self.read_by(code, pictures, folder, settings, workers)
-        return self.old[key]
 
     def note(self, dataset):
         """Camera and true points of every picture, by its content."""
@@ -137,15 +135,23 @@ def _made(suite, studio, folder, engine, console):
     return dataset
 
 
+def _read_old(frozen, studio, pictures, *words):
+    """What the baseline's code makes of a suite, once."""
+    key = suites.pictures_digest(pictures)
+    if key not in studio.old:
+        studio.old[key] = studio.read_old(frozen, pictures, *words)
+    return studio.old[key]
+
+
 @contextmanager
-def _running(real, fault, code, folder):
+def _running(real, fault, code, folder, function):
     """The process that is timed; the candidate's goes on after detection until that has taken so much longer."""
     program = speed.PROGRAM
     if fault.slower and code.folder == ROOT:
-        longer = f"start + {1.0 + fault.slower} * (time.process_time() - start) if name == 'detect' else 0.0"
+        longer = f"start + {1.0 + fault.slower} * (time.process_time() - start) if stage == 'detect' else 0.0"
         wait = f"        end = {longer}\n        while time.process_time() < end: pass\n"
-        program = program.replace("        stage()\n", f"        stage()\n{wait}")
-    with mock.patch.object(speed, "PROGRAM", program), real(code, folder) as process:
+        program = program.replace("        spent[stage] =", f"{wait}        spent[stage] =")
+    with mock.patch.object(speed, "PROGRAM", program), real(code, folder, function) as process:
         yield process
 
 
