@@ -20,6 +20,7 @@ from datasets.trajectories.view import PosedFrame, hand_held
 from eposit import Pose
 from render.sensor.motion import PoseRate
 from render.sensor.presets import SensorModel
+from render.targets.facing import shows_front
 from render.world import WorldDraw, draw_world
 from render.world.room import contains
 
@@ -175,8 +176,8 @@ def _planned(recipe: Recipe, pose: Pose) -> list[CameraSpec]:
 def _fault(spec: CameraSpec, pose: Pose, recipe: Recipe) -> str | None:
     """What is wrong with a pose in front of a camera, with the remedy; None if nothing."""
     camera, points = spec.true_camera(), pose.apply(recipe.target.points)
-    if pose.inverse().t[2] >= -recipe.target.circle_height_mm:
-        return "the camera is behind the board; turn the target's front towards it"
+    if not shows_front(recipe.target, pose.inverse().t):
+        return "the camera is behind the board or a bent part of it; turn the target's front towards it"
     if recipe.world.surround == "room" and not contains(recipe.world, recipe.target, pose.inverse().t):
         return "the camera is outside the room; increase world.room_mm, or world.floor_mm where it is below the floor"
     projected = camera.project(points)

@@ -93,7 +93,11 @@ FRAMES = pa.schema(
 KEYPOINTS = pa.schema(
     [
         _field("frame_id", pa.int64(), "frame"),
-        _field("point_id", pa.int32(), "point: inner corners row by row, then the circle"),
+        _field(
+            "point_id",
+            pa.int32(),
+            "point, row by row: inner corners and then the raised circle, corners of tags, or discs",
+        ),
         *_floats(
             {
                 "x_obj_mm": "x in the object frame",
@@ -101,8 +105,8 @@ KEYPOINTS = pa.schema(
                 "z_obj_mm": "z in the object frame, into the board",
                 "x_px": "true image of the point; null beyond the lens",
                 "y_px": "true image of the point; null beyond the lens",
-                "x_outline_px": "centroid of the projected outline: of the circle; a corner's is the corner",
-                "y_outline_px": "centroid of the projected outline: of the circle; a corner's is the corner",
+                "x_outline_px": "centroid of the projected outline: of a circle; a corner's is the corner",
+                "y_outline_px": "centroid of the projected outline: of a circle; a corner's is the corner",
                 "theta_deg": "incidence angle",
             }
         ),

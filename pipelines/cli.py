@@ -26,6 +26,7 @@ COMMANDS: tuple[tuple[Callable[..., None], str], ...] = (
     (stages.estimate, "estimate out/demo --solver opencv-sqpnp --points truth+noise --noise-px 0.4 --use four"),
     (stages.score, "score out/demo --poses poses.csv --name theirs"),
     (stages.report, "report out/demo"),
+    (stages.frame, "frame out/demo 0 --out out/frame.png"),
     (stages.demo, "demo --out out/demo"),
     (compare.compare, "compare out/before out/after"),
     (tools.verify, "verify out/demo"),

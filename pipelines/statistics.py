@@ -15,6 +15,7 @@ from eposit.arrays import Array, Mask
 RESAMPLES = 1000
 FEW = 200  # resamples where a table has many scores: an interval's ends are good to a tenth of its length
 LEVEL = 0.95
+LEAST_FOR_TAIL = 72  # units: 0.95^72 is below 2.5 %, the chance that all lie below their 95th percentile
 CHUNK_VALUES = 4_000_000  # resampled values held at once
 
 
@@ -82,6 +83,48 @@ def percentile95(values: Array) -> Array:
 def mean(values: Array) -> Array:
     """(r, m) to (r,), NaN left out: of failures as 0 and 1, a rate."""
     return np.nanmean(values, axis=1)
+
+
+def student(values: Array, level: float = LEVEL) -> Interval:
+    """Mean of independent values, (n,), with Student's interval (Student 1908); NaN values take no part.
+
+    Returns:
+        An infinite interval around a single value, NaN throughout without any.
+    """
+    known = values[np.isfinite(values)]
+    if not known.size:
+        return Interval(np.nan, np.nan, np.nan)
+    value = float(np.mean(known))
+    if known.size == 1:
+        return Interval(value, -np.inf, np.inf)
+    half = float(stats.t.ppf((1.0 + level) / 2.0, known.size - 1) * np.std(known, ddof=1) / np.sqrt(known.size))
+    return Interval(value, value - half, value + half)
+
+
+def root(found: Interval) -> Interval:
+    """Of a mean square with its interval; an end below zero is zero."""
+    return Interval(*(float(np.sqrt(max(end, 0.0))) for end in (found.value, found.low, found.high)))
+
+
+def tail(values: Array) -> Interval | None:
+    """95th percentile of (n,) or (n, k) values, k of one unit, with the interval that order statistics give it.
+
+    It holds for any distribution; the values of a unit may depend on each other in any way that leaves each of k sets
+    of n like the others. NaN values take no part, nor units that have no other.
+
+    Returns:
+        None below `LEAST_FOR_TAIL` units: even the largest value is then below the percentile too often.
+    Source:
+        Conover 1999, Practical Nonparametric Statistics, section 3.2.
+    """
+    units = values.reshape(len(values), -1)
+    n = int(np.sum(np.any(np.isfinite(units), axis=1)))
+    if n < LEAST_FOR_TAIL:
+        return None
+    ordered = np.sort(units[np.isfinite(units)])
+    first, last = (int(stats.binom.ppf(part, n, 0.95)) for part in ((1.0 - LEVEL) / 2.0, (1.0 + LEVEL) / 2.0))
+    low, high = (first - 1) * len(ordered) // n, -(-(last + 1) * len(ordered) // n) - 1
+    return Interval(float(np.percentile(ordered, 95.0)), float(ordered[low]), float(ordered[high]))
 
 
 def rate(happened: Mask) -> Interval:

@@ -22,8 +22,8 @@ from render.pathtraced.fisheye import sensor_dict
 from render.pathtraced.picture import Viewpoint, prepared, trace_picture
 from render.pathtraced.scene import reference_scene
 from render.region import Image, target_region
-from render.targets.chessboard import Chessboard
 from render.targets.image_region import Region
+from render.targets.kinds import AnyTarget
 from render.truth.pixels import PixelTruth, pixel_truth
 from render.truth.visibility import visible_points
 from render.world import World, WorldDraw
@@ -58,7 +58,7 @@ class LinearImage:
 
 
 def render_world(
-    world: World, draw: WorldDraw, target: Chessboard, light: Light, view: Viewpoint, *, samples: int, in_colour: bool
+    world: World, draw: WorldDraw, target: AnyTarget, light: Light, view: Viewpoint, *, samples: int, in_colour: bool
 ) -> LinearImage:
     """Render one frame of a world in linear light, by the world's method.
 
@@ -91,7 +91,7 @@ class FrameTruth:
 
     scene: DeviceScene
     composition: Composition
-    target: Chessboard
+    target: AnyTarget
     camera: Camera
     cam_from_obj: Pose
 
@@ -108,7 +108,7 @@ class FrameTruth:
 
 
 def truth_of(
-    world: World, draw: WorldDraw, target: Chessboard, light: Light, camera: Camera, cam_from_obj: Pose
+    world: World, draw: WorldDraw, target: AnyTarget, light: Light, camera: Camera, cam_from_obj: Pose
 ) -> FrameTruth:
     """The truth of one frame, by rays in the scene that its picture shows.
 
@@ -124,7 +124,7 @@ def _grey_or_colour(rgb: Image, in_colour: bool) -> Image:
 
 
 def render_frame(
-    target: Chessboard,
+    target: AnyTarget,
     light: Light,
     camera: Camera,
     cam_from_obj: Pose,
@@ -142,7 +142,7 @@ def render_frame(
 
 
 def render_reference(
-    target: Chessboard,
+    target: AnyTarget,
     light: Light,
     camera: Camera,
     cam_from_obj: Pose,

@@ -18,6 +18,7 @@ from render.targets.disc_shade import blocked_share
 
 GRID_SHARE = 0.01  # spacing of the map of the light in squares: 1 mm on the paper's board, a third of the penumbra
 LAMP_SAMPLES = 48  # lamp positions along each side for the circle's shadow
+SHEET_TEXELS = 200  # of the map along each side of a board without a shadow
 SMOOTH_SAMPLES = 6  # Gauss-Legendre nodes along each side where nothing casts a shadow
 
 
@@ -95,7 +96,7 @@ def shadow_radius(target: Chessboard, light: Light) -> float:
     return float(target.circle_radius_mm + 1.1 * target.circle_height_mm * slope + 2.0 * GRID_SHARE * target.square_mm)
 
 
-def reference_irradiance(target: Chessboard, light: Light) -> tuple[float, float]:
+def reference_irradiance(target: Target, light: Light) -> tuple[float, float]:
     """Irradiance of a lamp of unit radiance, and the share of the surrounding it leaves, at the board's centre."""
     lamp = float(lamp_irradiance(target, light, target.board_centre[None], SMOOTH_SAMPLES, shadowed=False)[0])
     return lamp, 1.0 - lamp / np.pi
@@ -115,11 +116,31 @@ def _smooth_lamp(target: Chessboard, light: Light, points: Array) -> Array:
     return np.stack([np.interp(np.arange(rows), iy, column) for column in across.T], axis=1)
 
 
-def lamp_irradiance(target: Chessboard, light: Light, points: Array, samples: int, *, shadowed: bool) -> Array:
-    """Irradiance of a lamp of unit radiance at (n, 3) points that face -z, by quadrature over the lamp's area.
+def sheet_shading_map(target: Target, light: Light) -> Array:
+    """(SHEET_TEXELS, SHEET_TEXELS) radiance over reflectance of a printed board, which may be bent.
 
-    samples: along each side of the lamp. Gauss-Legendre where nothing casts a shadow, so that six are exact to nine
-    digits; the midpoint rule where the circle's shadow jumps within the lamp.
+    Over the nominal extent of its sheet, samples at texel centres, x along columns. The board's white at its centre has
+    radiance 1. Each place has the lamp and the surrounding that its own normal faces; light from one part of a hollow
+    board on another, which is less than (4 sag / width)^2 of all, is left out, and so is the shade of its borders.
+    """
+    x0, x1, y0, y1 = target.sheet.extent_mm
+    share = (np.arange(SHEET_TEXELS) + 0.5) / SHEET_TEXELS
+    at = np.stack(np.meshgrid(x0 + (x1 - x0) * share, y0 + (y1 - y0) * share), axis=-1).reshape(-1, 2)
+    points, normals = target.sheet.lift(at), target.sheet.normals(at)
+    lamp = lamp_irradiance(target, light, points, SMOOTH_SAMPLES, shadowed=False, normals=normals)
+    lamp_here, ambient_here = reference_irradiance(target, light)
+    lit = (1.0 - light.ambient_share) * lamp / lamp_here + light.ambient_share * (1.0 - lamp / np.pi) / ambient_here
+    return (lit / target.white).reshape(SHEET_TEXELS, SHEET_TEXELS)
+
+
+def lamp_irradiance(
+    target: Target, light: Light, points: Array, samples: int, *, shadowed: bool, normals: Array | None = None
+) -> Array:
+    """Irradiance of a lamp of unit radiance at (n, 3) points, by quadrature over the lamp's area.
+
+    normals: (n, 3) unit vectors that the points face; -z if left out. shadowed: whether the circle of a chessboard
+    keeps light away. samples: along each side of the lamp. Gauss-Legendre where nothing casts a shadow, so that six are
+    exact to nine digits; the midpoint rule where the circle's shadow jumps within the lamp.
     """
     corners = light.lamp_corners(target)
     edge_a, edge_b = corners[1] - corners[0], corners[3] - corners[0]
@@ -128,21 +149,28 @@ def lamp_irradiance(target: Chessboard, light: Light, points: Array, samples: in
     normal = normal / area
     shares, weights = _midpoint_rule(samples) if shadowed else _gauss_legendre_rule(samples)
     px, py, pz = np.ascontiguousarray(points.T)
-    cx, cy, cz = target.circle_centre
-    reach = pz - cz  # along -z from the point to the circle's plane
     total = np.zeros(len(points))
     for (a, weight_a), (b, weight_b) in itertools.product(zip(shares, weights, strict=True), repeat=2):
         lx, ly, lz = corners[0] + a * edge_a + b * edge_b
         x, y, z = lx - px, ly - py, lz - pz
         distance2 = x * x + y * y + z * z
-        cosines = np.maximum(-z, 0.0) * np.abs(x * normal[0] + y * normal[1] + z * normal[2])
+        cosines = _toward(x, y, z, normals) * np.abs(x * normal[0] + y * normal[1] + z * normal[2])
         value = cosines * (area * weight_a * weight_b) / (distance2 * distance2)
         if shadowed:
-            share = reach / -z
+            assert isinstance(target, Chessboard)  # no other target casts a shadow
+            cx, cy, cz = target.circle_centre
+            share = (pz - cz) / -z  # of the way to the lamp, to the circle's plane
             across, down = px + x * share - cx, py + y * share - cy
             value[across * across + down * down < target.circle_radius_mm**2] = 0.0
         total += value
     return total
+
+
+def _toward(x: Array, y: Array, z: Array, normals: Array | None) -> Array:
+    """(n,) vectors' components along the normals, 0 where they point away."""
+    if normals is None:
+        return np.maximum(-z, 0.0)
+    return np.maximum(x * normals[:, 0] + y * normals[:, 1] + z * normals[:, 2], 0.0)
 
 
 def _midpoint_rule(samples: int) -> tuple[Array, Array]:

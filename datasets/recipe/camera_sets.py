@@ -19,7 +19,7 @@ CameraValues = dict[str, Any]  # keys of a `CameraSpec`
 def camera_references() -> dict[str, list[CameraValues]]:
     """What `from` takes: the name of a set, for all of its cameras in order, or `set.camera` for one of them."""
     found: dict[str, list[CameraValues]] = {}
-    for path in sorted(SETS.iterdir(), key=lambda path: path.name):
+    for path in sorted(SETS.iterdir(), key=lambda path: path.name.removesuffix(SUFFIX)):
         name, cameras = path.name.removesuffix(SUFFIX), _cameras(path.read_text(encoding="utf-8"))
         found[name] = cameras
         found |= {f"{name}.{camera['name']}": [camera] for camera in cameras}

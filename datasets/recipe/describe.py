@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, asdict, fields, is_dataclass
 from typing import Any, get_args, get_type_hints
 
@@ -14,6 +14,7 @@ from datasets.recipe.camera_sets import FROM, camera_references, reference_of
 from datasets.recipe.cameras import CameraSpec
 from datasets.trajectories import TRAJECTORIES
 from render.sensor.presets import DEFAULT_REGIME, SensorModel, regime_of, regimes
+from render.targets.kinds import PATTERNS
 
 Key = tuple[str, str, str]  # key, default, meaning
 Place = tuple[int | str, ...]  # where a fault is, in Pydantic's form
@@ -23,6 +24,7 @@ OWN_VALUES = "own values"  # shown where values have no name
 # What Pydantic calls these faults, and how the names of types begin that it puts between keys.
 UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
 MISSING_KEY = ("missing", "missing_argument", "missing_keyword_only_argument")
+KINDS: dict[str, Mapping[str, type]] = {"trajectory": TRAJECTORIES, "target": PATTERNS}  # of sections with several
 TYPE_NAMES = ("tuple[", "literal[")
 
 
@@ -47,19 +49,28 @@ def _sections(hint: Any) -> list[type]:
 
 
 def _merged(sections: list[type]) -> Iterator[Key]:
-    """Keys of a section; where it has several kinds, each key once, with the kinds that take it."""
-    seen: set[str] = set()
+    """Keys of a section; where it has several kinds, each key once, with the kinds that take it.
+
+    Where kinds mean different things by a key, each meaning has its kinds before it, and the defaults stand in the same
+    order.
+    """
+    found: dict[str, list[tuple[type, str, str]]] = {}
     for section in sections:
         for key, default, meaning in _section_keys(section):
-            takers = [other for other in sections if key.partition(".")[0] in field_names(other)]
-            note = "" if len(takers) == len(sections) else f"{', '.join(map(_kind, takers))}: "
-            if key not in seen:
-                yield key, default, note + meaning
-            seen.add(key)
+            found.setdefault(key, []).append((section, default, meaning))
+    for key, takers in found.items():
+        meanings = list(dict.fromkeys(meaning for _, _, meaning in takers))
+        defaults = [next(default for _, default, other in takers if other == meaning) for meaning in meanings]
+        if len(takers) == len(sections) and len(meanings) == 1:
+            yield key, defaults[0], meanings[0]
+            continue
+        kinds = [", ".join(_kind(section) for section, _, other in takers if other == meaning) for meaning in meanings]
+        noted = "; ".join(f"{kind}: {meaning}" for kind, meaning in zip(kinds, meanings, strict=True))
+        yield key, "; ".join(dict.fromkeys(defaults)), noted
 
 
 def _kind(section: type) -> str:
-    return next(name for name, kind in TRAJECTORIES.items() if kind is section)
+    return next(name for kinds in KINDS.values() for name, kind in kinds.items() if kind is section)
 
 
 def _section_keys(section: type) -> Iterator[Key]:
@@ -90,7 +101,7 @@ def values_of(recipe: BaseModel) -> dict[str, str]:
 
 
 def _value_of(recipe: BaseModel, key: str) -> str | None:
-    """A key's value; None for a key of another kind of trajectory than the recipe's."""
+    """A key's value; None for a key of another kind of its section than the recipe's."""
     head, _, tail = key.partition(".")
     value = getattr(recipe, head)
     if key == REGIME:
@@ -133,7 +144,7 @@ def sentence(error: ValidationError, model: type[BaseModel]) -> str:
     path, fault, message = _path(first["loc"]), first["type"], first["msg"]
     key = ".".join(path) or "recipe"
     if fault in UNKNOWN_KEY:
-        return f"unknown key {key!r}{_known_instead(path, _trajectory_at(first['loc']), model)}"
+        return f"unknown key {key!r}{_known_instead(path, _section_at(first['loc']), model)}"
     if fault in MISSING_KEY:
         return f"key {key!r} is missing; add it"
     if fault == "value_error":
@@ -142,21 +153,21 @@ def sentence(error: ValidationError, model: type[BaseModel]) -> str:
     return f"key {key!r} is {given} ({why}); it takes: {_meaning(path, model)}"
 
 
-def _trajectory_at(place: Place) -> type | None:
-    """The kind of trajectory that a place in a recipe lies in; Pydantic names it behind the key `trajectory`."""
-    return TRAJECTORIES.get(str(place[1])) if len(place) > 1 and place[0] == "trajectory" else None
+def _section_at(place: Place) -> type | None:
+    """The kind of section that a place in a recipe lies in; Pydantic names it behind the section's key."""
+    return KINDS[str(place[0])].get(str(place[1])) if len(place) > 1 and place[0] in KINDS else None
 
 
 def _path(place: Place) -> list[str]:
     """The keys to a place as a recipe has them: without the types that Pydantic names between them."""
-    parts = place[:1] + place[2:] if _trajectory_at(place) else place
+    parts = place[:1] + place[2:] if _section_at(place) else place
     return [str(part) for part in parts if not str(part).startswith(TYPE_NAMES)]
 
 
-def _known_instead(path: list[str], trajectory: type | None, model: type[BaseModel]) -> str:
+def _known_instead(path: list[str], section: type | None, model: type[BaseModel]) -> str:
     """What stands behind an unknown key: the one that may be meant, and all that are known there."""
-    if trajectory and len(path) == 2:
-        known, where = field_names(trajectory), f"known keys of kind {_kind(trajectory)!r} are"
+    if section and len(path) == 2:
+        known, where = field_names(section), f"known keys of kind {_kind(section)!r} are"
     else:
         known, where = _keys_beside(path, model), "known keys there are"
     return f"{did_you_mean(path[-1], known)}; {where} {', '.join(known)}"

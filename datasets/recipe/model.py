@@ -20,6 +20,7 @@ from datasets.recipe.cameras import assumed_camera as assumed_camera
 from datasets.recipe.describe import Key, keys_of, sentence, values_of
 from datasets.recipe.outputs import Outputs
 from datasets.recipe.quality import QUALITIES, QualityName, quality_text
+from datasets.recipe.targets import DEFAULT_PATTERN, target_values
 from datasets.recipe.world_file import with_world_file
 from datasets.recipe.written_out import written_out
 from datasets.trajectories import TRAJECTORIES, Trajectory
@@ -27,6 +28,7 @@ from datasets.trajectories.helix import Helix
 from render.light import Light
 from render.sensor.presets import DEFAULT_REGIME, SensorModel, regimes
 from render.targets.chessboard import CIRCLE, Chessboard
+from render.targets.kinds import PATTERNS, AnyTarget
 from render.world import World
 
 RECIPES = resources.files("datasets") / "recipes"
@@ -60,10 +62,10 @@ class Recipe(BaseModel):
         tuple[tuple[int, int] | str, ...] | None,
         Field(
             description='points of `--use four`, M0 first: inner corners [column, row] from 0, or "circle"; '
-            "the outermost corners of the first row and column and the circle if left out"
+            "the outermost corners of the first row and column and the circle if left out; only for pattern chessboard"
         ),
     ] = None
-    target: Annotated[Chessboard, Field(description="the board and its circle")] = Chessboard()
+    target: Annotated[AnyTarget, Field(discriminator="pattern", description="the board")] = Chessboard()
     light: Annotated[Light, Field(description="lamp, surrounding, background")] = Light()
     sensor: Annotated[SensorModel, Field(description="linear light to 8 bits")] = SensorModel()
     world: Annotated[World, Field(description="what surrounds the target, and how its light is computed")] = World()
@@ -98,10 +100,32 @@ class Recipe(BaseModel):
         return QUALITIES[self.quality].samples if self.samples is None else self.samples
 
     def four_indices(self) -> list[int]:
-        """Rows in `Chessboard.points` of the four points, M0 first."""
-        across, down = self.target.inner
+        """Rows in the target's `points` of the four points, M0 first.
+
+        Of a target without a circle they are the outermost points of the first and the last row, all in one plane.
+
+        Raises:
+            ValueError: the recipe names four points of such a target, or one that the target does not have.
+        """
+        across, down = self.target.point_grid
+        if not isinstance(self.target, Chessboard):
+            if self.four is not None:
+                raise ValueError(f'four is for pattern "chessboard"; leave it out for {self.target.pattern!r}')
+            return [0, across - 1, across * (down - 1), across * down - 1]
         four = ((0, 0), (across - 1, 0), (0, down - 1), CIRCLE) if self.four is None else self.four
         return [self.target.index(point) for point in four]
+
+    def chessboard(self) -> Chessboard:
+        """The target, for what needs the chessboard with its circle.
+
+        Raises:
+            UserError: it is another kind.
+        """
+        if not isinstance(self.target, Chessboard):
+            raise UserError(
+                f'recipe {self.name} has the target {self.target.pattern!r}; this needs pattern = "chessboard"'
+            )
+        return self.target
 
     def __hash__(self) -> int:
         return hash(self.digest())
@@ -113,7 +137,7 @@ class Recipe(BaseModel):
         a world's file its hash counts, not its place.
         """
         content = self.model_dump(mode="json", exclude={"name", "description", "quality"})
-        content["samples"] = self.sample_count()
+        content |= {"samples": self.sample_count(), "target": target_values(self.target)}
         for name, default in (("world", World()), ("outputs", Outputs())):
             if getattr(self, name) == default:
                 del content[name]
@@ -143,8 +167,12 @@ def parse_recipe(text: str, source: str) -> Recipe:
 
 
 def _completed(data: dict[str, Any], source: str) -> dict[str, Any]:
-    """A recipe's data with the trajectory's kind and the values of the sensor's regime and of cameras that it names."""
-    path, sensor = data.get("trajectory"), data.get("sensor")
+    """A recipe's data with its trajectory's and target's kinds and the values of the regime and cameras it names."""
+    path, sensor, target = data.get("trajectory"), data.get("sensor"), data.get("target")
+    if isinstance(target, dict):
+        pattern = target.setdefault("pattern", DEFAULT_PATTERN)
+        if pattern not in list(PATTERNS):
+            raise UserError(f"{source}: target pattern is {pattern!r}; choose one of {', '.join(PATTERNS)}")
     if isinstance(path, dict):
         kind = path.setdefault("kind", "helix")
         if kind not in list(TRAJECTORIES):

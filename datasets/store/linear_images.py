@@ -17,6 +17,7 @@ import numpy as np
 from datasets.errors import UserError
 from datasets.plan import Frame, plan
 from datasets.recipe.model import Recipe
+from datasets.recipe.targets import target_values
 from datasets.store.atomic import replace_atomically, write_text
 from eposit import Camera
 from render.frame import LinearImage
@@ -171,7 +172,7 @@ def linear_key(recipe: Recipe, frame: Frame) -> str:
     By the closed form nothing of Mitsuba's decides anything, and nothing is random.
     """
     parts: dict[str, object] = {
-        "target": asdict(recipe.target),
+        "target": target_values(recipe.target),
         "light": asdict(recipe.light),
         "camera": asdict(frame.camera.true_camera()),
         "R": frame.cam_from_obj.R.tolist(),

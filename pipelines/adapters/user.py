@@ -44,7 +44,7 @@ def load_function(name: str, option: str) -> Callable[..., Any]:
     module_name, _, path = name.partition(":")
     here = str(Path.cwd())
     if not {"", here} & set(sys.path):
-        sys.path.insert(0, here)
+        sys.path.append(here)  # behind a frozen copy of the function, if the path begins with one
     try:
         found_there: Any = importlib.import_module(module_name)
     except (Exception, SystemExit) as error:

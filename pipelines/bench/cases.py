@@ -36,7 +36,7 @@ def chosen_frames(recipe: Recipe, poses: int) -> dict[str, list[Frame]]:
 def linear_of(recipe: Recipe, frame: Frame, samples: int | None = None) -> LinearImage:
     """A frame's linear light, at the recipe's samples if none are given."""
     return render_frame(
-        recipe.target,
+        recipe.chessboard(),
         recipe.light,
         frame.camera.true_camera(),
         frame.cam_from_obj,
@@ -62,7 +62,7 @@ def over_background(recipe: Recipe, camera: Camera, film: Image, region: Region)
 
 def corner_errors(recipe: Recipe, frame: Frame, linear: LinearImage) -> NDArray[np.float64]:
     """(n, 2) errors, px, of the corners that our detection finds in the picture; NaN where it finds none."""
-    target = recipe.target
+    target = recipe.chessboard()
     found = detect_points(image_of(recipe, frame, linear), target).points_px
     truth = frame.camera.true_camera().project(frame.cam_from_obj.apply(target.points))
     return (found - truth)[: target.circle_index]

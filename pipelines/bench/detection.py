@@ -28,10 +28,10 @@ def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
     for camera, frames in chosen_frames(recipe, poses).items():
         images = [image_of(recipe, frame) for frame in frames]
         calls = [_ours, classic, sector_based]
-        times = [in_turn(*(functools.partial(call, image, recipe.target) for call in calls)) for image in images]
+        times = [in_turn(*(functools.partial(call, image, recipe.chessboard()) for call in calls)) for image in images]
         sums.append([total(list(column)) for column in zip(*times, strict=True)])
         yield from _rows(camera, sums[-1], len(images))
-        ours, *theirs = (_found(call, images, recipe.target) for call in calls)
+        ours, *theirs = (_found(call, images, recipe.chessboard()) for call in calls)
         told = " and ".join(map(str, theirs))
         yield Figure(
             PART, f"{camera}: boards found of {len(images)}", str(ours), f"found by {' and '.join(NAMES)}", told

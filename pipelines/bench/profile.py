@@ -41,7 +41,7 @@ def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
 
 
 def _steps(recipe: Recipe, frame: Frame, folder: Path) -> Iterator[tuple[str, Call, str, Call]]:
-    camera, target = frame.camera.true_camera(), recipe.target
+    camera, target = frame.camera.true_camera(), recipe.chessboard()
     linear = linear_of(recipe, frame)
     picture, image = linear.full(camera), image_of(recipe, frame, linear)
     data = encode_png(image)

@@ -1,4 +1,4 @@
-"""`compare`: whether one dataset's accuracy is worse than another's."""
+"""`compare`: whether the accuracy of one dataset, of one run, or of one state of the code is worse than another's."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.console import Console
 
 from datasets.errors import UserError
 from pipelines.commands import options as o
@@ -21,25 +22,53 @@ COLUMNS = (
 )  # fmt: skip
 MOST_NAMED = 10  # frames that fail anew, in one line
 
-Old = Annotated[Path, typer.Argument(metavar="OLD", help="Folder of the dataset to compare with.")]
-New = Annotated[Path, typer.Argument(metavar="NEW", help="Folder of the dataset that is judged.")]
+REGIMES = ["typical"]
+
+Old = Annotated[str, typer.Argument(metavar="OLD", help="Dataset, commit, checkout, or run, to compare with.")]
+New = Annotated[str, typer.Argument(metavar="NEW", help="The same of what is judged.")]
 Alpha = Annotated[float, typer.Option(help="Chance of a false alarm, over all metrics and slices together.")]
+OfHistory = Annotated[
+    Path | None, typer.Option("--history", metavar="DIR", help="OLD and NEW are runs of these nights, or `latest`.")
+]
+CodeRecipe = Annotated[str, typer.Option("--recipe", help="Recipe of the pictures that two commits read.")]
+CodeRegimes = Annotated[
+    list[str], typer.Option("--regime", help="Sensor regime of the pictures that two commits read; may be given again.")
+]
+Kept = Annotated[
+    Path, typer.Option("--out", help="Folder that keeps pictures and code of commits; a history's will do.")
+]
 
 
-def compare(old: Old, new: New, alpha: Alpha = 0.01, json: o.Json = False) -> None:
+def compare(
+    old: Old,
+    new: New,
+    alpha: Alpha = 0.01,
+    history: OfHistory = None,
+    recipe: CodeRecipe = "nightly",
+    regime: CodeRegimes = REGIMES,
+    out: Kept = Path("out/compare"),
+    workers: o.Workers = 1,
+    quiet: o.Quiet = False,
+    json: o.Json = False,
+) -> None:
     """Tell whether NEW is worse than OLD; exit code 1 if it is.
 
-    Both have been scored. The same views, with other code or another sensor, are compared frame by frame, which shows
-    the smallest changes; other views of the same recipe as two samples.
+    Two datasets that have been scored, or two runs of a history: the same views, with other code or another sensor, are
+    compared frame by frame, which shows the smallest changes; other views of the same recipe as two samples. Two
+    commits or checkouts: each reads the same pictures in a process of its own.
     """
     from pipelines.nightly.comparison import LEAST_POSES
-    from pipelines.nightly.judgement import judge
-    from pipelines.nightly.measures import measure, same_views
+    from pipelines.nightly.revisions import Pictures, compare_code
 
     if not 0.0 < alpha < 1.0:
         raise UserError(f"--alpha {alpha:g}: a chance lies between 0 and 1; take 0.01")
-    before, after = opened(old), opened(new)
-    found = judge(measure(before), measure(after), alpha, same_views(before, after))
+    if history is not None:
+        found = _of_runs(history, old, new, alpha)
+    elif _is_dataset(old) or _is_dataset(new):
+        found = _of_datasets(Path(old), Path(new), alpha)
+    else:
+        pictures = Pictures(recipe, tuple(dict.fromkeys(regime)), out)
+        found = compare_code(old, new, pictures, alpha, workers, Console(quiet=quiet, stderr=True))
     if not found.findings and not found.identical:
         few = f"have no slice with {LEAST_POSES} common poses"
         raise UserError(f"{old} and {new} {few}; compare larger runs of one recipe")
@@ -49,6 +78,33 @@ def compare(old: Old, new: New, alpha: Alpha = 0.01, json: o.Json = False) -> No
         _print(found, alpha)
     if _is_worse(found):
         raise SystemExit(WORSE)
+
+
+def _is_dataset(name: str) -> bool:
+    """Whether a name is a folder, and no checkout: what is wrong with a dataset is told of it as such."""
+    from pipelines.nightly.revisions import is_checkout
+
+    return Path(name).is_dir() and not is_checkout(Path(name))
+
+
+def _of_datasets(old: Path, new: Path, alpha: float) -> Judgement:
+    from pipelines.nightly.judgement import judge
+    from pipelines.nightly.measures import measure, same_views
+
+    before, after = opened(old), opened(new)
+    return judge(measure(before), measure(after), alpha, same_views(before, after))
+
+
+def _of_runs(root: Path, old: str, new: str, alpha: float) -> Judgement:
+    """What two runs measured on the pinned pictures, frame by frame if these were the same."""
+    from pipelines.nightly.history import History
+    from pipelines.nightly.judgement import judge
+
+    history = History(root)
+    runs = [history.run(name) for name in (old, new)]
+    before, after = (history.pinned(run) for run in runs)
+    data = [{item["name"]: item["value"] for item in run["data"]} for run in runs]
+    return judge(before, after, alpha, data[0]["pinned"] == data[1]["pinned"])
 
 
 def _is_worse(found: Judgement) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 NIGHTS_BACK = 14  # of the trend that `explain` prints
 REGIMES = ["typical", "harsh"]
+LONGEST_S = 86400.0  # that a function may take
 
 HistoryFolder = Annotated[Path, typer.Option("--history", help="Folder of the nights: history, baselines, pictures.")]
 Regimes = Annotated[list[str], typer.Option("--regime", help="Sensor regime of the pictures; may be given again.")]
@@ -25,16 +26,34 @@ Seed = Annotated[int | None, typer.Option(min=0, help="Seed of the fresh picture
 Without = Annotated[
     list[str] | None, typer.Option("--without", help="Gate that is left out: fresh or speed; may be given again.")
 ]
-Judged = Annotated[
+Estimators = Annotated[
     list[str] | None,
-    typer.Option("--solver", help="One more solver, or your own function, judged on the pinned pictures."),
+    typer.Option(
+        "--estimator",
+        metavar="PACKAGE.MODULE:FUNCTION",
+        help="Your whole system: a function of image, camera and target; may be given again.",
+    ),
+]
+PoseFiles = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--poses",
+        metavar="FILE",
+        help="Poses of another system for the pinned pictures, .csv or .parquet, as poses-{regime}.csv if there are "
+        "several regimes; may be given again.",
+    ),
+]
+PoseNames = Annotated[
+    list[str] | None, typer.Option("--name", help="Name of the poses of --poses, in their order, in tables and page.")
+]
+TimeLimit = Annotated[
+    float,
+    typer.Option(metavar="SECONDS", help="Time that each of your functions may take on the pictures of a regime."),
 ]
 RunName = Annotated[str, typer.Argument(metavar="RUN", help="Run of the history, or `latest`.")]
 SliceName = Annotated[str, typer.Argument(metavar="SLICE", help="As regime/camera/system.")]
 OfRun = Annotated[str, typer.Option("--run", help="Run of the history.")]
 SuiteName = Annotated[str, typer.Argument(metavar="SUITE", help="As the page names it, for example pinned-typical.")]
-FrameNumber = Annotated[int, typer.Argument(metavar="FRAME", help="Its frame_id in the suite.")]
-Png = Annotated[Path, typer.Option("--out", help="File of the picture.")]
 Reason = Annotated[str, typer.Option(help="Why; it stays in baselines.toml.")]
 Until = Annotated[str | None, typer.Option(metavar="DATE", help="Last day of a waiver, as 2026-05-04.")]
 By = Annotated[str | None, typer.Option(help="Who accepts.  [default: the user's name]")]
@@ -51,7 +70,11 @@ def run(
     history: HistoryFolder,
     regime: Regimes = REGIMES,
     seed: Seed = None,
-    solver: Judged = None,
+    solver: o.MoreSolvers = None,
+    estimator: Estimators = None,
+    poses: PoseFiles = None,
+    name: PoseNames = None,
+    time_limit: TimeLimit = 3600.0,
     without: Without = None,
     workers: o.Workers = 1,
     quiet: o.Quiet = False,
@@ -61,17 +84,22 @@ def run(
     The pinned pictures are made in the first night. Without a baseline there is no verdict: `nightly accept` makes a
     run the baseline, and keeps a copy of its code. The page, and files for machines, lie in the history's folder.
     """
-    from pipelines.nightly.night import Request, run_night
+    from pipelines.nightly.desk import Request
+    from pipelines.nightly.night import run_night
+    from pipelines.nightly.systems import asked
 
-    for name in without or []:
-        if name not in ("fresh", "speed"):
-            raise UserError(f"--without {name}: choose fresh or speed; the other gates cost nothing")
+    for gate in without or []:
+        if gate not in ("fresh", "speed"):
+            raise UserError(f"--without {gate}: choose fresh or speed; the other gates cost nothing")
+    if not 0.0 < time_limit <= LONGEST_S:
+        raise UserError(f"--time-limit {time_limit:g}: give seconds above 0 and at most {LONGEST_S:g}, as 600")
+    regimes = tuple(dict.fromkeys(regime))
     request = Request(
         recipe=recipe,
         history=history,
-        regimes=tuple(dict.fromkeys(regime)),
+        regimes=regimes,
         seed=int(f"{datetime.date.today():%Y%m%d}") if seed is None else seed,
-        solvers=_settings(solver or []),
+        systems=asked(recipe, regimes, (solver or [], estimator or []), (poses or [], name or []), time_limit),
         workers=workers,
         without=tuple(without or ()),
     )
@@ -121,19 +149,17 @@ def explain(slice: SliceName, history: HistoryFolder, run: OfRun = "latest", jso
 
 
 def frame(
-    suite: SuiteName, frame_id: FrameNumber, history: HistoryFolder, run: OfRun = "latest", out: Png = Path("frame.png")
+    suite: SuiteName,
+    frame_id: o.FrameNumber,
+    history: HistoryFolder,
+    run: OfRun = "latest",
+    out: o.Png = Path("frame.png"),
 ) -> None:
     """Make one picture of a run again, into a PNG, and tell what this code finds in it."""
-    from datasets.store.images import encode_png
-    from datasets.store.refusals import refused
+    from pipelines.commands.pictures import show
     from pipelines.nightly.one_frame import remake
 
-    found = remake(history, run, suite, frame_id)
-    try:
-        out.write_bytes(encode_png(found.image))
-    except OSError as error:
-        raise refused(out, error) from error
-    typer.echo(f"{out}: frame {frame_id} of {suite}, camera {found.camera}\n{found.told}")
+    show(remake(history, run, suite, frame_id), out, f"frame {frame_id} of {suite}")
 
 
 def report(history: HistoryFolder, run: OfRun = "latest") -> None:
@@ -145,15 +171,6 @@ def report(history: HistoryFolder, run: OfRun = "latest") -> None:
     nights = History(history)
     write_page(nights, nights.name_of(run), path)
     typer.echo(str(path))
-
-
-def _settings(names: list[str]) -> tuple[Any, ...]:
-    from pipelines.adapters.registry import find_solver, takes_four
-    from pipelines.stages.settings import Setting
-
-    for name in names:
-        find_solver(name)
-    return tuple(Setting(name, use="four" if takes_four(name) else "all") for name in names)
 
 
 def _print_night(night: Night, history: Path) -> None:

@@ -15,6 +15,8 @@ Out = Annotated[Path, typer.Option("--out", help="Folder of the dataset; a run t
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a dataset.")]
 RecipeName = Annotated[str, typer.Argument(metavar="RECIPE", help="A .toml file, or a name from `recipes`.")]
 ShownRecipe = Annotated[str | None, typer.Argument(metavar="[RECIPE]", help="Show its values beside the keys.")]
+FrameNumber = Annotated[int, typer.Argument(metavar="FRAME", help="Its frame_id.")]
+Png = Annotated[Path, typer.Option("--out", help="File of the picture.")]
 Workers = Annotated[int, typer.Option(help="Processes; the result is the same for any number.")]
 EngineName = Annotated[
     str, typer.Option("--engine", help="Where shards are worked on: local, or ray (to be installed).")

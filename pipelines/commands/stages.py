@@ -174,6 +174,15 @@ def report(folder: o.Folder) -> None:
     complete_manifest(dataset)
 
 
+def frame(folder: o.Folder, frame_id: o.FrameNumber, out: o.Png = Path("frame.png")) -> None:
+    """Make one picture of a dataset again, into a PNG, and tell what this code finds in it."""
+    from pipelines.commands.pictures import show
+    from pipelines.stages.one_frame import remake
+
+    recipe = opened(folder).recipe
+    show(remake(recipe, frame_id, f"dataset {folder}"), out, f"frame {frame_id} of {folder}")
+
+
 def _execution(engine: str, workers: int, ray_address: str | None, shard: str | None, quiet: bool) -> Execution:
     """What the options about where and how much mean.
 

@@ -178,6 +178,10 @@ def _print_what_recipes_name() -> None:
     settings = [(f"sensor.{key}", *map(str, row)) for key, row in regime_rows()]
     print_table((Column("key"), *(Column(name, number=True) for name in regimes())), settings)
     typer.echo("\nCameras that a recipe can name:\n")
-    numbers = ("fx", "fy", "cx", "cy", "width", "height", "nominal_f")
-    cameras = [(name, *(str(getattr(camera, key)) for key in numbers)) for name, camera in camera_rows()]
-    print_table((Column("cameras.from"), *(Column(key, number=True) for key in numbers)), cameras)
+    numbers = ("fx", "fy", "cx", "cy")
+    columns = (Column("cameras.from"), *(Column(key, number=True) for key in (*numbers, "size", "nominal")))
+    cameras = [
+        (name, *(f"{getattr(of, key):.7g}" for key in numbers), f"{of.width}x{of.height}", f"{of.nominal_f:g}")
+        for name, of in camera_rows()
+    ]
+    print_table(columns, cameras)

@@ -12,13 +12,15 @@ from pipelines.nightly.accepted import Baseline, Waiver
 from pipelines.nightly.baselines import FILE_NAME
 from pipelines.nightly.history import History
 from pipelines.nightly.other_code import freeze
+from pipelines.nightly.systems import frozen_of
 
 
 def accept_baseline(root: Path, run: str, reason: str, by: str | None) -> str:
     """Make a run the baseline of its recipe, and keep a copy of this code; the baseline's name.
 
     Raises:
-        UserError: no such run, one that could not run, one of other code than this, or the disk refuses.
+        UserError: no such run, one that could not run, one of other code than this, a copy of a user's function that is
+            gone, or the disk refuses.
     """
     history = History(root)
     found = history.run(run)
@@ -41,9 +43,20 @@ def accept_baseline(root: Path, run: str, reason: str, by: str | None) -> str:
         accepted_by=by or getpass.getuser(),
         accepted_on=datetime.date.today(),
         reason=reason,
+        systems=_systems(root, known),
     )
     baselines.accept(root / FILE_NAME, entry)
     return entry.name
+
+
+def _systems(root: Path, known: dict[str, str]) -> dict[str, Path]:
+    """Each of a user's functions in a run with its frozen copy, as seen from the history's folder."""
+    found = {name: Path("code") / copy for name, copy in frozen_of(known)}
+    for name, folder in found.items():
+        if not (root / folder).is_dir():
+            told = f"the copy of {name} is not in {root / folder} any more"
+            raise UserError(f"{told}; run `nightly run` again and accept that run, so that its code can be kept")
+    return found
 
 
 def waive(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import date
 from pathlib import Path
 from typing import Annotated, Literal
@@ -33,6 +33,10 @@ class Baseline:
     accepted_by: Annotated[str, "who accepted it", NOT_EMPTY]
     accepted_on: Annotated[date, "when, as 2026-05-04"]
     reason: Annotated[str, "why", NOT_EMPTY]
+    systems: Annotated[
+        dict[str, Path],
+        "a user's functions, each with the folder of its code, frozen or installed, beside this file if not absolute",
+    ] = field(default_factory=dict[str, Path])
 
     def __post_init__(self) -> None:
         if (self.checkout is None) == (self.version is None):

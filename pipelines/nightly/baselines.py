@@ -42,7 +42,7 @@ class Baselines:
     """The file as it was read."""
 
     path: Path
-    baselines: tuple[Baseline, ...]  # a checkout is an absolute path
+    baselines: tuple[Baseline, ...]  # folders are absolute paths
     waivers: tuple[Waiver, ...]
 
     def current(self, recipe: str) -> Baseline:
@@ -113,16 +113,16 @@ def _entry(entry: Baseline | Waiver) -> str:
     """The entry as TOML, keys without a value left out."""
     table = tomlkit.table()
     for key, value in asdict(entry).items():
-        if value is not None:
+        if value is not None and value != {}:
             table[key] = _inline(value) if isinstance(value, dict) else _plain(value)
     entries = tomlkit.aot()
     entries.append(table)
     return tomlkit.dumps({"baseline" if isinstance(entry, Baseline) else "waiver": entries})
 
 
-def _inline(values: dict[str, str]) -> InlineTable:
+def _inline(values: dict[str, object]) -> InlineTable:
     table = tomlkit.inline_table()
-    table.update(values)
+    table.update({key: _plain(value) for key, value in values.items()})
     return table
 
 
@@ -158,5 +158,10 @@ def _parsed(path: Path, text: str) -> Baselines:
     if twice is not None:
         raise UserError(f"{path}: key 'baseline.name' is {twice!r} {names.count(twice)} times; give each its own name")
     folder = path.resolve().parent
-    found = (replace(item, checkout=folder / item.checkout) if item.checkout else item for item in held.baseline)
-    return Baselines(path, tuple(found), held.waiver)
+    return Baselines(path, tuple(_placed(item, folder) for item in held.baseline), held.waiver)
+
+
+def _placed(item: Baseline, folder: Path) -> Baseline:
+    """A baseline whose folders are absolute."""
+    checkout = None if item.checkout is None else folder / item.checkout
+    return replace(item, checkout=checkout, systems={name: folder / own for name, own in item.systems.items()})

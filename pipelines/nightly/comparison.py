@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from eposit.arrays import Array, Mask
 from pipelines.nightly.metrics import Kind, Metric
@@ -44,33 +45,43 @@ class Change:
     @property
     def interval(self) -> tuple[float, float]:
         """Two-sided 95 % interval of the effect."""
-        half = float(stats.t.ppf(0.975, self.freedom)) * self.error
+        half = float(special.stdtrit(self.freedom, 0.975)) * self.error
         return self.effect - half, self.effect + half
 
     @property
     def is_equal(self) -> bool:
         """Whether two one-sided tests at 5 % show a change of less than the margin (Schuirmann 1987)."""
-        return abs(self.effect) + float(stats.t.ppf(0.95, self.freedom)) * self.error < self.metric.margin
+        return abs(self.effect) + float(special.stdtrit(self.freedom, 0.95)) * self.error < self.metric.margin
 
     def smallest_visible(self, alpha: float, tests: int) -> float:
         """Change that is seen in 95 of 100 such comparisons, `tests` of which share `alpha`; never below the margin."""
-        seen = (float(stats.t.ppf(1.0 - alpha / (2.0 * tests), self.freedom)) + POWER_QUANTILE) * self.error
+        seen = (float(special.stdtrit(self.freedom, 1.0 - alpha / (2.0 * tests))) + POWER_QUANTILE) * self.error
         return max(seen, self.metric.margin)
 
 
-def compare_paired(metric: Metric, old: Array, new: Array) -> Change | None:
-    """Compare per-pose values of the same poses, NaN where a side has none; None below `LEAST_POSES` common poses.
+def compare_paired(metrics: Sequence[Metric], old: Array, new: Array) -> list[Change]:
+    """Compare per-pose values of the same poses, NaN where a side has none; nothing below `LEAST_POSES` common poses.
 
-    old, new: (n,) each the mean over the frames and draws of one pose, which stay together since they share the pose
-    and the noise; poses are independent.
+    old, new: (m, n) for each metric and pose the mean over its frames and draws, which stay together since they share
+    the pose and the noise; poses are independent.
     """
     both = np.isfinite(old) & np.isfinite(new)
-    n = int(np.sum(both))
-    if n < LEAST_POSES:
-        return None
-    before, after = _Side.of(metric, old[both]), _Side.of(metric, new[both])
-    error = float(np.std(after.influence - before.influence, ddof=1) / np.sqrt(n))
-    return _change(metric, before, after, error, n - 1, n)
+    poses = np.sum(both, axis=1)
+    ratio = np.array([metric.kind is Kind.CALIBRATION for metric in metrics])
+    with np.errstate(invalid="ignore", divide="ignore"):  # metrics that are left out below
+        (before, of_old), (after, of_new) = (_paired_side(ratio, side, both, poses) for side in (old, new))
+        moved = of_new - of_old
+        spread = np.where(both, moved - (np.sum(moved, axis=1) / poses)[:, None], 0.0)
+        errors = np.sqrt(np.sum(spread**2, axis=1) / (poses - 1) / poses)
+    sides = zip(metrics, before.tolist(), after.tolist(), errors.tolist(), poses.tolist(), strict=True)
+    return [_change(*item[:4], item[4] - 1, item[4]) for item in sides if item[4] >= LEAST_POSES]
+
+
+def _paired_side(ratio: Mask, values: Array, both: Mask, poses: Array) -> tuple[Array, Array]:
+    """(m,) estimates and (m, n) how much each pose moves them, times the number of poses; as `_Side.of`."""
+    known = np.where(both, values, 0.0)
+    mean = np.sum(known, axis=1) / poses
+    return np.where(ratio, np.log(mean), mean), np.where(ratio[:, None], known / mean[:, None], known)
 
 
 def compare_unpaired(metric: Metric, old: Array, new: Array) -> Change | None:
@@ -83,7 +94,7 @@ def compare_unpaired(metric: Metric, old: Array, new: Array) -> Change | None:
     total = sum(parts)
     spread = sum(part**2 / (len(side.influence) - 1) for part, side in zip(parts, (before, after), strict=True))
     freedom = total**2 / spread if spread else float(min(len(old), len(new)) - 1)
-    return _change(metric, before, after, float(np.sqrt(total)), freedom, min(len(old), len(new)))
+    return _change(metric, before.estimate, after.estimate, float(np.sqrt(total)), freedom, min(len(old), len(new)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,17 +112,15 @@ class _Side:
         return cls(mean, values)
 
 
-def _change(metric: Metric, old: _Side, new: _Side, error: float, freedom: float, poses: int) -> Change:
-    effect = new.estimate - old.estimate
-    worse = effect > 0.0 if metric.kind is Kind.LOGARITHM else abs(new.estimate) > abs(old.estimate)
-    return Change(
-        metric, poses, old.estimate, new.estimate, effect, error, freedom, _p_value(effect, error, freedom), bool(worse)
-    )
+def _change(metric: Metric, old: float, new: float, error: float, freedom: float, poses: int) -> Change:
+    effect = new - old
+    worse = effect > 0.0 if metric.kind is Kind.LOGARITHM else abs(new) > abs(old)
+    return Change(metric, poses, old, new, effect, error, freedom, _p_value(effect, error, freedom), worse)
 
 
 def _p_value(effect: float, error: float, freedom: float) -> float:
     if error > 0.0:
-        return float(2.0 * stats.t.sf(abs(effect) / error, freedom))
+        return float(2.0 * special.stdtr(freedom, -abs(effect) / error))
     return 1.0 if effect == 0.0 else 0.0  # the same numbers, or each moved by the same amount
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import pyarrow as pa
 
 from datasets.errors import UserError
+from pipelines.nightly.gates.regenerate import Again
 from pipelines.nightly.judgement import Finding
 from pipelines.nightly.other_code import OtherCodeError
 from pipelines.nightly.record import Exit, Outcome, State, Timing
@@ -27,6 +28,7 @@ class Found:
     measures: dict[str, pa.Table] = field(default_factory=dict)  # by suite and side
     data: dict[str, str] = field(default_factory=dict)  # what was read, and its digest
     timings: list[Timing] = field(default_factory=list)
+    again: list[Again] = field(default_factory=list)  # pinned frames, rendered again
 
     def stopped(self) -> bool:
         """Whether a gate has failed that the later ones need."""

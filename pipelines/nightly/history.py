@@ -50,7 +50,8 @@ RUNS = pa.schema(
             "data",
             _PAIRS,
             "what was read, with its hash: `pinned` and each suite with its regime, the pictures; `replay` with "
-            "a suite and a setting, poses of unchanged points; `code`, its files; `fresh seed`, that seed itself",
+            "a suite and a setting, poses of unchanged points; `code`, its files; `code of` a user's "
+            "function, its files; `fresh seed`, that seed itself",
         ),
         _field(
             "gates",
@@ -177,6 +178,17 @@ class History:
         if table_digest(table) != digest:
             raise UserError(f"{path} does not hold what its name says; restore it or accept a new baseline")
         return table
+
+    def pinned(self, run: dict[str, Any]) -> pa.Table:
+        """What a run, a row of `RUNS`, measured on the pinned pictures.
+
+        Raises:
+            UserError: it did not get through them, or the table is missing or damaged.
+        """
+        digests = {item["name"]: item["value"] for item in run["measures"]}
+        if "pinned new" not in digests:
+            raise UserError(f"run {run['run_id']} did not get through the pinned pictures; choose another run")
+        return self.measures(digests["pinned new"])
 
     def _read(self, kind: str, run_ids: Sequence[str], schema: pa.Schema) -> pa.Table:
         tables = [_read(self.root / kind / f"{run_id}.parquet", schema) for run_id in run_ids]

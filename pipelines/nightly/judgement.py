@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,7 +73,12 @@ def judge(old: pa.Table, new: pa.Table, alpha: float, paired: bool) -> Judgement
     alpha: family-wise level over all slices and metrics. paired: both hold the same frames, by `frame_id`; without it
     the poses are different samples, which hides more, and frames cannot be compared one by one.
     """
-    before, after = ({item.name: item for item in slices(table)} for table in (old, new))
+    return judge_slices(slices(old), slices(new), alpha, paired)
+
+
+def judge_slices(old: Sequence[Slice], new: Sequence[Slice], alpha: float, paired: bool) -> Judgement:
+    """The same for the slices of two tables."""
+    before, after = ({item.name: item for item in side} for side in (old, new))
     common = [name for name in after if name in before]
     found = [(name, change) for name in common for change in _changes(before[name], after[name], paired)]
     meant = verdicts([change for _, change in found], alpha)
@@ -87,27 +92,27 @@ def judge(old: pa.Table, new: pa.Table, alpha: float, paired: bool) -> Judgement
     return Judgement(findings, failures, paired, identical, lost, *only)
 
 
-def _changes(old: Slice, new: Slice, paired: bool) -> Iterator[Change]:
-    poses = np.intersect1d(old.pose_id, new.pose_id) if paired else None
-    for name in new.values:
-        if name not in old.values:
-            continue
-        if poses is None:
-            sides = (side.by_pose(name, np.unique(side.pose_id)) for side in (old, new))
-            change = compare_unpaired(METRICS[name], *sides)
-        else:
-            change = compare_paired(METRICS[name], old.by_pose(name, poses), new.by_pose(name, poses))
-        if change is not None:
-            yield change
+def _changes(old: Slice, new: Slice, paired: bool) -> list[Change]:
+    names = [name for name in new.values if name in old.values]
+    metrics = [METRICS[name] for name in names]
+    if paired:
+        poses = np.intersect1d(old.pose_id, new.pose_id)
+        return compare_paired(metrics, old.by_pose(names, poses), new.by_pose(names, poses))
+    found: list[Change] = []
+    for metric in metrics:
+        own = (side.by_pose([metric.name], np.unique(side.pose_id))[0] for side in (old, new))
+        change = compare_unpaired(metric, *own)
+        found += [] if change is None else [change]
+    return found
 
 
 def _failures(old: Slice, new: Slice) -> Failures:
     frames, of_old, of_new = np.intersect1d(old.frame_id, new.frame_id, return_indices=True)
     before, after = old.failed[of_old], new.failed[of_new]
     gone, come = after & ~before, before & ~after
-    for name in old.values.keys() | new.values.keys():
-        has, has_now = (side.has(name)[of] for side, of in ((old, of_old), (new, of_new)))
-        gone, come = gone | (has & ~has_now), come | (has_now & ~has)
+    names = list(old.values)  # a metric that is wholly new mends nothing
+    has, has_now = (side.has(names)[:, of] for side, of in ((old, of_old), (new, of_new)))
+    gone, come = gone | np.any(has & ~has_now, axis=0), come | np.any(has_now & ~has, axis=0)
     return Failures(new.name, len(frames), _ids(frames, gone), _ids(frames, come & ~gone))
 
 

@@ -6,6 +6,7 @@ A system is a detector, whose rows hold the corners and the circle, or a setting
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,9 +20,10 @@ from datasets.store.dataset import Dataset
 from datasets.store.nulls import with_nans
 from eposit import Status
 from eposit.arrays import Array, Mask
-from pipelines.nightly.metrics import CORNERS, METRICS, POSES, Metric
+from pipelines.nightly.metrics import CORNERS, METRICS, POSES, SIGNED_POSES, Metric
 from pipelines.report.data import SETTING
 from pipelines.report.points import PointErrors, point_errors
+from pipelines.stages.estimate import REACHES_BOUND
 from render.sensor.presets import regime_of
 
 EXACT_POINTS = "truth"  # poses of exact points: their errors are rounding, whose size means nothing
@@ -49,13 +51,19 @@ class Slice:
         """As shown and as `explain` takes it."""
         return f"{self.regime}/{self.camera}/{self.system}"
 
-    def has(self, metric: str) -> Mask:
-        """(f,) whether a frame has a metric."""
-        return np.isfinite(self.values[metric]) if metric in self.values else np.zeros(len(self.frame_id), bool)
+    def has(self, metrics: Sequence[str]) -> Mask:
+        """(m, f) whether a frame has a metric."""
+        nothing = np.full(len(self.frame_id), np.nan)
+        return np.isfinite([self.values.get(name, nothing) for name in metrics]).reshape(len(metrics), -1)
 
-    def by_pose(self, metric: str, poses: NDArray[np.int64]) -> Array:
-        """(p,) mean of a metric over the frames of each of `poses`, which are sorted; NaN where none has it."""
-        values = self.values[metric]
+    def by_pose(self, metrics: Sequence[str], poses: NDArray[np.int64]) -> Array:
+        """(m, p) means of metrics over the frames of each of `poses`, which are sorted; NaN where none has it."""
+        values = np.array([self.values[name] for name in metrics]).reshape(len(metrics), -1)
+        if np.array_equal(self.pose_id, poses):  # one frame for each, as wherever a camera is in a pose once
+            return np.where(np.isfinite(values), values, np.nan)
+        return np.array([self._means(row, poses) for row in values]).reshape(len(metrics), -1)
+
+    def _means(self, values: Array, poses: NDArray[np.int64]) -> Array:
         own = np.isfinite(values) & np.isin(self.pose_id, poses)
         place = np.searchsorted(poses, self.pose_id[own])
         with np.errstate(invalid="ignore"):
@@ -99,12 +107,16 @@ SCHEMA = pa.schema(
 
 
 def slices(measures: pa.Table) -> list[Slice]:
-    """The slices of a table of measures, in the order of the table."""
+    """The slices of a table of measures, in the order of the table; one of before a metric was added lacks it."""
     keys = list(zip(*(measures[name].to_pylist() for name in KEY), strict=True))
+    number = {key: i for i, key in enumerate(dict.fromkeys(keys))}
+    of_row = np.array([number[key] for key in keys])
+    frame = measures["frame_id"].to_numpy()
     found: list[Slice] = []
-    for key in dict.fromkeys(keys):
-        rows = measures.filter(pa.array([other == key for other in keys])).sort_by("frame_id")
-        values = {name: rows[name].to_numpy(zero_copy_only=False) for name in METRICS}
+    for key, i in number.items():
+        own = np.flatnonzero(of_row == i)
+        rows = measures.take(own[np.argsort(frame[own], kind="stable")])
+        values = {name: rows[name].to_numpy(zero_copy_only=False) for name in METRICS if name in rows.column_names}
         held = {name: column for name, column in values.items() if np.any(np.isfinite(column))}
         ids = [rows[name].to_numpy() for name in ("frame_id", "pose_id")]
         failed = rows["failed"].to_numpy(zero_copy_only=False)
@@ -144,13 +156,17 @@ def _of_poses(dataset: Dataset, frames: list[dict[str, Any]], regime: str) -> li
             "pose_nees": nees,
             "pose_log_t": np.log(length),
             "pose_log_R": np.log(_column(scores, "rotation_error_deg")),
+            **{f"t{axis}_error": _column(scores, f"t{axis}_error_mm") for axis in "xyz"},
+            **{f"r{axis}_error": _column(scores, f"r{axis}_error_deg") for axis in "xyz"},
         }
     exact = scores["point_source"].to_numpy(zero_copy_only=False) == EXACT_POINTS
     for name in dict.fromkeys(names[~exact].tolist()):
         own = names == name
         means = {metric: _mean_by_row(row[own], column[own], len(frames)) for metric, column in values.items()}
         missing = np.bincount(row[own], failed[own], len(frames)) > 0.0
-        found.append(_table(frames, regime, name, missing, POSES, means))
+        # The choice is one of the solver and not of its numbers: one that begins to state covariances loses nothing.
+        metrics = POSES if name.split()[0] == REACHES_BOUND else (*POSES, *SIGNED_POSES)
+        found.append(_table(frames, regime, name, missing, metrics, means))
     return found
 
 

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import datetime
 import traceback
-from dataclasses import dataclass
-from pathlib import Path
 
 import pyarrow as pa
 from rich.console import Console
 
-from datasets.errors import UserError
 from datasets.store.dataset import Dataset
 from datasets.store.digest import combined_digest
 from pipelines.engines.local import LocalEngine
@@ -18,63 +15,34 @@ from pipelines.machine import provenance
 from pipelines.nightly import suites
 from pipelines.nightly.accepted import Baseline
 from pipelines.nightly.baselines import FILE_NAME, Baselines, load
+from pipelines.nightly.desk import Desk, Request, code_of
+from pipelines.nightly.differences import other_code, other_machine
 from pipelines.nightly.found import BASELINE, RAN, Found
+from pipelines.nightly.fresh_pictures import judge_fresh
 from pipelines.nightly.gates import accuracy, data, failures, fresh, regenerate, replay, speed, tail
 from pipelines.nightly.history import History, new_run_id
-from pipelines.nightly.judgement import Judgement, judge
-from pipelines.nightly.other_code import ROOT, Code, freeze
+from pipelines.nightly.judgement import judge
+from pipelines.nightly.other_code import Code, freeze
 from pipelines.nightly.outputs import write_all
 from pipelines.nightly.outputs.results import Results
-from pipelines.nightly.page.pictures import Picture
-from pipelines.nightly.page.write import write_page
+from pipelines.nightly.page.frames import rendered_otherwise
+from pipelines.nightly.page.write import Shown, write_page
+from pipelines.nightly.reading import Here, Reading
 from pipelines.nightly.record import Exit, Night, Outcome, State, Timing
+from pipelines.nightly.systems import kept_code
 from pipelines.nightly.work_folder import work_folder
 from pipelines.nightly.worst_frames import pictures_of_all, worst
-from pipelines.stages.settings import Setting
+from pipelines.pages.pictures import Picture
 
 ENDED_WAIVERS = "ended waivers"  # name of a fact
 ORDER = ("data", "regenerate", "replay", "accuracy", "fresh", "failures", "tail", "speed")
-
-
-@dataclass(frozen=True, slots=True)
-class Request:
-    """What is asked of a night."""
-
-    recipe: str
-    history: Path
-    regimes: tuple[str, ...]
-    seed: int  # of the fresh pictures
-    solvers: tuple[Setting, ...] = ()  # systems beside ours, judged on the pinned pictures
-    workers: int = 1
-    without: tuple[str, ...] = ()  # gates that are left out
-
-
-@dataclass(frozen=True, slots=True)
-class Desk:
-    """What the steps of a night work with."""
-
-    request: Request
-    history: History
-    work: Path
-    baselines: Baselines
-    engine: LocalEngine
-    console: Console
-
-    @property
-    def settings(self) -> tuple[Setting, ...]:
-        """What is estimated on the pinned pictures."""
-        return suites.READ + self.request.solvers
-
-    def waived(self, gate: str, place: str, what: str | int | None) -> bool:
-        """Whether somebody has accepted it."""
-        return self.baselines.is_waived(gate, place, what, datetime.date.today())
 
 
 def run_night(request: Request, console: Console) -> Night:
     """Run a night and append it to the history. An error in a gate is that gate's outcome, with exit code 4.
 
     Raises:
-        UserError: wrong use: a recipe, regime, solver or `baselines.toml` that is not usable, a damaged history, or a
+        UserError: wrong use: a recipe, regime, system or `baselines.toml` that is not usable, a damaged history, or a
             folder that cannot be written.
     """
     started = datetime.datetime.now(datetime.UTC)
@@ -82,9 +50,11 @@ def run_night(request: Request, console: Console) -> Night:
     baselines, history = load(request.history / FILE_NAME), History(request.history)
     history.check()
     baseline = next((item for item in reversed(baselines.baselines) if item.recipe == request.recipe), None)
-    found = Found(data={"code": freeze(request.history / "code").name, suites.SEED: str(request.seed)})
+    here = Here(LocalEngine(request.workers), console, Code(freeze(request.history / "code")))
+    functions = kept_code(request.systems, here.code)
+    found = Found(data={"code": here.code.folder.name, suites.SEED: str(request.seed), **functions})
     with work_folder(request.history) as work:
-        desk = Desk(request, history, work, baselines, LocalEngine(request.workers), console)
+        desk = Desk(request, history, work, baselines, here)
         _judge_all(desk, wanted, found)
         left = [gate for gate in ORDER if gate not in {item.gate for item in found.outcomes}]
         found.outcomes += [Outcome(gate, State.NOT_RUN, "nothing to judge") for gate in left]
@@ -94,7 +64,8 @@ def run_night(request: Request, console: Console) -> Night:
         )  # fmt: skip
         history.append(night, found.findings, accuracy.ALPHA, found.measures)
         write_all(Results(night, found.findings, accuracy.ALPHA, found.measures), request.history)
-        shown = _pictures(desk, night, baseline, found) if baseline and night.exit else []
+        worst_ones = _pictures(desk, night, baseline, found) if baseline and night.exit else []
+        shown = Shown(worst_ones, rendered_otherwise(found.again, night.run_id, request.history))
         write_page(history, night.run_id, request.history / "report.html", shown)
     return night
 
@@ -119,11 +90,17 @@ def _judge_all(desk: Desk, wanted: list[suites.Suite], found: Found) -> None:
         pictures |= {suite.name: suite.make(store / suite.name, desk.engine, desk.console) for suite in wanted}
         digests = {name: suites.pictures_digest(dataset) for name, dataset in pictures.items()}
         found.data |= {suites.PINNED: combined_digest("", digests.items()), **digests}
-        found.measures["pinned new"], of_poses = _read_pinned(desk, pictures)
-        replayed |= of_poses
+        readings = _read_pinned(desk, pictures)
+        found.measures["pinned new"] = pa.concat_tables([item.measures for item in readings.values()])
+        for name, item in readings.items():
+            replayed |= {f"{name} {setting}": digest for setting, digest in item.replayed.items()}
         found.data |= {f"replay {name}": digest for name, digest in replayed.items()}
         count = sum(dataset.read("frames", ["frame_id"]).num_rows for dataset in pictures.values())
-        found.outcomes.append(Outcome(RAN, State.PASSED, f"every stage ran on {count} pinned frames"))
+        told = [
+            f"every stage ran on {count} pinned frames",
+            *(text for item in readings.values() for text in item.left_out),
+        ]
+        found.outcomes.append(Outcome(RAN, State.PASSED, "; ".join(told)))
     if found.stopped():
         return
     baseline = _baseline(desk, found)
@@ -151,14 +128,22 @@ def _judge_data(
     with found.at_gate(data.GATE):
         found.outcomes.append(data.judge(found.data[suites.PINNED], baseline.pinned_data))
     with found.at_gate(regenerate.GATE):
-        of_baseline = {item["name"]: item["value"] for item in desk.history.run(baseline.run)["facts"]}
-        same = all(of_baseline.get(name) == value for name, value in machine())
-        again = [item for name, dataset in pictures.items() for item in regenerate.render_again(name, dataset)]
-        found.outcomes.append(regenerate.judge(again, same))
+        found.again += [item for name, dataset in pictures.items() for item in regenerate.render_again(name, dataset)]
+        facts = _mapping(desk.history.run(baseline.run)["facts"])
+        found.outcomes.append(regenerate.judge(found.again, other_machine(facts, dict(machine()))))
     with found.at_gate(replay.GATE):
-        known = {item["name"]: item["value"] for item in desk.history.run(baseline.run)["data"]}
+        run = desk.history.run(baseline.run)
+        known, facts = _mapping(run["data"]), _mapping(run["facts"])
         old = {name.removeprefix("replay "): value for name, value in known.items() if name.startswith("replay ")}
-        found.outcomes.append(replay.judge(old, replayed))
+        moved = replay.largest_change(
+            desk.history.measures(baseline.measures[suites.PINNED]), found.measures[f"{suites.PINNED} new"]
+        )
+        reasons = (*other_machine(facts, dict(machine())), *other_code(known.get("code"), found.data["code"]))
+        found.outcomes.append(replay.judge(old, replayed, moved, reasons))
+
+
+def _mapping(pairs: list[dict[str, str]]) -> dict[str, str]:
+    return {item["name"]: item["value"] for item in pairs}
 
 
 def _judge_numbers(desk: Desk, pictures: dict[str, Dataset], baseline: Baseline, found: Found) -> None:
@@ -173,7 +158,7 @@ def _judge_numbers(desk: Desk, pictures: dict[str, Dataset], baseline: Baseline,
         return
     if fresh.GATE not in desk.request.without:
         with found.at_gate(fresh.GATE):
-            tonight = _judge_fresh(desk, code_of(baseline, desk.request.history), found)
+            tonight = judge_fresh(desk, baseline, found)
     with found.at_gate(failures.GATE):
         found.outcomes.append(failures.judge(pinned, tonight, lambda *what: desk.waived(failures.GATE, *what)))
     with found.at_gate(tail.GATE):
@@ -181,44 +166,13 @@ def _judge_numbers(desk: Desk, pictures: dict[str, Dataset], baseline: Baseline,
         found.outcomes.append(tail.judge(old, new, lambda *what: desk.waived(tail.GATE, *what)))
     if speed.GATE not in desk.request.without:
         with found.at_gate(speed.GATE):
-            found.timings += _timings(desk, code_of(baseline, desk.request.history), pictures)
+            found.timings += _timings(desk, baseline, pictures)
             found.outcomes.append(speed.judge(found.timings, lambda stage: desk.waived(speed.GATE, stage, None)))
 
 
-def _judge_fresh(desk: Desk, code: Code, found: Found) -> Judgement:
-    first = _compare_fresh(desk, code, suites.FRESH, desk.request.seed, found)
-
-    def again() -> Judgement:
-        return _compare_fresh(desk, code, suites.CONFIRMING, desk.request.seed + suites.CONFIRMING_SEED, found)
-
-    found.outcomes.append(fresh.judge(first, again, lambda *what: desk.waived(fresh.GATE, *what)))
-    return first
-
-
-def _compare_fresh(desk: Desk, code: Code, kind: str, seed: int, found: Found) -> Judgement:
-    sides: tuple[list[pa.Table], list[pa.Table]] = ([], [])
-    for suite in suites.suites(kind, desk.request.recipe, desk.request.regimes, seed):
-        pictures = suite.make(desk.work / suite.name, desk.engine, desk.console)
-        found.data[suite.name] = suites.pictures_digest(pictures)
-        before = suites.read_by(code, pictures, desk.work / f"{suite.name}-old", suites.READ, desk.request.workers)
-        after = suites.read_here(pictures, desk.work / f"{suite.name}-new", suites.READ, desk.engine, desk.console)
-        for side, reading in zip(sides, (before, after), strict=True):
-            side.append(reading.measures)
-    old, new = (pa.concat_tables(side) for side in sides)
-    found.measures |= {f"{kind} old": old, f"{kind} new": new}
-    judged = judge(old, new, fresh.ALPHA, paired=True)
-    found.findings[kind] = judged.findings
-    return judged
-
-
-def _read_pinned(desk: Desk, pictures: dict[str, Dataset]) -> tuple[pa.Table, dict[str, str]]:
-    tables: list[pa.Table] = []
-    replayed: dict[str, str] = {}
-    for name, dataset in pictures.items():
-        reading = suites.read_here(dataset, desk.work / name, desk.settings, desk.engine, desk.console)
-        tables.append(reading.measures)
-        replayed |= {f"{name} {setting}": digest for setting, digest in reading.replayed.items()}
-    return pa.concat_tables(tables), replayed
+def _read_pinned(desk: Desk, pictures: dict[str, Dataset]) -> dict[str, Reading]:
+    systems = desk.request.systems
+    return {name: desk.here.read(dataset, desk.work / name, systems) for name, dataset in pictures.items()}
 
 
 def _pictures(desk: Desk, night: Night, baseline: Baseline, found: Found) -> list[Picture]:
@@ -232,23 +186,8 @@ def _pictures(desk: Desk, night: Night, baseline: Baseline, found: Found) -> lis
         return []
 
 
-def _timings(desk: Desk, code: Code, pictures: dict[str, Dataset]) -> list[Timing]:
+def _timings(desk: Desk, baseline: Baseline, pictures: dict[str, Dataset]) -> list[Timing]:
     name, dataset = next(iter(pictures.items()))
     folders = tuple(suites.copy_pictures(dataset, desk.work / f"{name}-{side}") for side in ("time-old", "time-new"))
     frames = dataset.read_shard(dataset.shards("frames")[0], ["frame_id"]).num_rows
-    return speed.time_both(code, Code(ROOT), (folders[0], folders[1]), frames)
-
-
-def code_of(baseline: Baseline, history: Path) -> Code:
-    """The baseline's code.
-
-    Raises:
-        UserError: it names an installed version whose folder is not there.
-    """
-    if baseline.checkout is not None:
-        return Code(baseline.checkout)
-    folder = history / "code" / f"eposit-{baseline.version}"
-    if not folder.is_dir():
-        wanted = f"pip install --no-deps --target {folder} eposit=={baseline.version}"
-        raise UserError(f"baseline {baseline.name} is version {baseline.version} of eposit, not in {folder}; {wanted}")
-    return Code(folder, ("eposit",))
+    return speed.time_all(desk.frozen(baseline), desk.here.code, (folders[0], folders[1]), frames)

@@ -10,19 +10,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import pyarrow as pa
 from rich.console import Console
 
 from datasets.errors import UserError
 from datasets.recipe.model import Recipe, load_recipe, parse_recipe
 from datasets.recipe.override import with_regime, with_values
 from datasets.store.claim import claim
-from datasets.store.dataset import RECIPE_FILE, Dataset, open_dataset
+from datasets.store.dataset import RECIPE_FILE, Dataset
 from datasets.store.digest import combined_digest, table_digest
 from datasets.store.reuse import share_pictures
 from pipelines.engines.engine import Engine
-from pipelines.nightly.measures import measure
-from pipelines.nightly.other_code import Code
 from pipelines.stages import run as stages
 from pipelines.stages.missing import Execution
 from pipelines.stages.settings import RUN_SETTINGS, Setting
@@ -89,59 +86,11 @@ def _fewer_poses(recipe: Recipe) -> dict[tuple[str, ...], int]:
     return {} if count is None else {("trajectory", "count"): min(count, FRESH_POSES)}
 
 
-@dataclass(frozen=True, slots=True)
-class Reading:
-    """What one system made of a suite."""
-
-    measures: pa.Table
-    replayed: dict[str, str]  # setting to the digest of its poses
-
-
-def read_here(
-    pictures: Dataset, folder: Path, settings: Sequence[Setting], engine: Engine, console: Console
-) -> Reading:
-    """Read a suite with this code, in a folder that shares its pictures."""
-    dataset = open_dataset(copy_pictures(pictures, folder))
-    execution = Execution(engine, console)
-    stages.run_detect(dataset, execution)
-    stages.run_estimate(dataset, settings, execution)
-    stages.run_score(dataset, execution)
-    return _reading(dataset)
-
-
-def read_by(code: Code, pictures: Dataset, folder: Path, settings: Sequence[Setting], workers: int) -> Reading:
-    """Read a suite with other code.
-
-    Raises:
-        OtherCodeError: that code failed, as when it does not understand the pictures' tables.
-    """
-    copy_pictures(pictures, folder)
-    common = ("--workers", str(workers), "--quiet")
-    estimates = [("estimate", folder, *_options(setting), *common) for setting in settings]
-    code.run_all([("detect", folder, *common), *estimates, ("score", folder, *common)])
-    return _reading(open_dataset(folder))
-
-
 def copy_pictures(pictures: Dataset, folder: Path) -> Path:
     """A new dataset's folder that shares the pictures and their truth of another."""
     with claim(folder, pictures.recipe, (pictures.root / RECIPE_FILE).read_text(encoding="utf-8")) as dataset:
         share_pictures(dataset, pictures)
     return folder
-
-
-def _options(setting: Setting) -> tuple[str, ...]:
-    noise = ("--noise-px", repr(setting.noise_px), "--draws", str(setting.draws))
-    own = ("--solver", setting.solver, "--points", setting.points, "--camera", setting.camera, "--use", setting.use)
-    return own + (noise if setting.points == "truth+noise" else ())
-
-
-def _reading(dataset: Dataset) -> Reading:
-    replayed: dict[str, str] = {}
-    for setting in REPLAYED:
-        shards = [path for path in dataset.shards("estimates") if path.name.startswith(f"{setting.name}-")]
-        if shards:
-            replayed[setting.name] = _digest(dataset, shards)
-    return Reading(measure(dataset), replayed)
 
 
 def pictures_digest(dataset: Dataset) -> str:
@@ -153,8 +102,9 @@ def pictures_digest(dataset: Dataset) -> str:
     paths = [path for table in ("frames", "keypoints") for path in dataset.shards(table)]
     if not paths:
         raise UserError(f"{dataset.root} holds no pictures; delete it, and the next night makes them again")
-    return _digest(dataset, paths)
+    return shards_digest(dataset, paths)
 
 
-def _digest(dataset: Dataset, shards: Sequence[Path]) -> str:
+def shards_digest(dataset: Dataset, shards: Sequence[Path]) -> str:
+    """Hash of the decoded content of some shards."""
     return combined_digest("", ((path.name, table_digest(dataset.read_shard(path))) for path in shards))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,9 +16,9 @@ from pipelines.nightly.judgement import Finding
 from pipelines.nightly.measures import Slice, slices
 from pipelines.nightly.metrics import METRICS
 from pipelines.nightly.other_code import Code
-from pipelines.nightly.page.frames import Wanted, pictures_of
-from pipelines.nightly.page.pictures import Picture
+from pipelines.nightly.page.frames import Wanted, frame_command, pictures_of
 from pipelines.nightly.suites import FRESH, PINNED, copy_pictures
+from pipelines.pages.pictures import Picture
 
 MOST_FRAMES = 12
 
@@ -42,9 +41,8 @@ class Noticed:
 
     def wanted(self, run_id: str, root: Path) -> Wanted:
         """For the page of a run in a history's folder."""
-        kept = f"--run {run_id} --history {shlex.quote(str(root))}"
-        command = f"python -m pipelines nightly frame {self.suite} {self.frame_id} {kept} --out frame.png"
-        return Wanted(self.kind, self.slice, self.frame_id, self.reason, command)
+        command = frame_command(self.suite, self.frame_id, run_id, root)
+        return Wanted(f"{self.kind}, {self.slice}", self.frame_id, self.reason, command)
 
 
 def worst(measures: Mapping[str, pa.Table], findings: Mapping[str, Sequence[Finding]]) -> list[Noticed]:

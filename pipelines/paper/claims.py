@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Generic, TypeVar
 
-from pipelines.report.sections import Section
+from pipelines.pages.sections import Section
 
 Measured = TypeVar("Measured")
 EQUATIONS, RELEASED = "equations", "released"  # the paper's equations, and its released code's behaviour

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -15,14 +16,15 @@ from datasets.store.refusals import refused
 from pipelines.engines.engine import Engine
 from pipelines.engines.local import LocalEngine
 from pipelines.machine import versions
-from pipelines.paper.claims import Claim, PaperSection
-from pipelines.report.template import rendered
+from pipelines.pages.template import rendered
+from pipelines.paper.claims import Claim, PaperSection, Verdict
 
 PAGE, CLAIMS = "paper.html", "claims.md"
 TEMPLATE = Path(__file__).with_name("page.html")
 IMAGE_PARTS = ("images", "wide", "experiment")
 Measure = Callable[[], Sequence[PaperSection]]
 MAX_SEEDS = 1000
+MARKS = {Verdict.HOLDS: "better", Verdict.PARTLY: "partly", Verdict.FAILS: "worse"}  # classes of the style sheet
 
 
 def parts(out: Path, seeds: int, engine: Engine, tell: Callable[[str], None]) -> dict[str, Measure]:
@@ -103,11 +105,32 @@ def write(out: Path, sections: Sequence[PaperSection], claims: Sequence[Claim], 
     Raises:
         UserError: the disk refuses.
     """
-    html = rendered(TEMPLATE, sections=sections, claims=claims, versions=versions(), seeds=seeds)
+    counts = Counter(claim.verdict for claim in claims)
+    html = rendered(
+        TEMPLATE,
+        sections=sections,
+        claims=claims,
+        sentence=_sentence(counts),
+        held=counts[Verdict.HOLDS],
+        kinds=[(verdict.replace(" ", "-"), verdict.value) for verdict in Verdict if counts[verdict]],
+        marks=MARKS,
+        versions=versions(),
+        seeds=seeds,
+    )
     found = out / PAGE, out / CLAIMS
     for path, text in zip(found, (html, markdown(claims)), strict=True):
         write_text(path, text)
     return found
+
+
+def _sentence(counts: Counter[Verdict]) -> str:
+    """What the claims come to."""
+    if not counts:
+        return "The parts that were measured judge no claim of the paper."
+    return (
+        f"Of {counts.total()} claims {counts[Verdict.HOLDS]} hold, {counts[Verdict.PARTLY]} hold partly and "
+        f"{counts[Verdict.FAILS]} do not."
+    )
 
 
 def markdown(claims: Sequence[Claim]) -> str:

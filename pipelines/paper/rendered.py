@@ -18,10 +18,10 @@ from eposit import Status
 from eposit.arrays import Array
 from pipelines.engines.engine import Engine
 from pipelines.machine import provenance
+from pipelines.pages.sections import Table
 from pipelines.paper.beyond.field_images import field_of_images
 from pipelines.paper.claims import PaperSection
 from pipelines.paper.simulation import COMPONENTS, LENSES, UNITS
-from pipelines.report.sections import Table
 from pipelines.stages.missing import Execution
 from pipelines.stages.run import run_detect, run_estimate, run_generate, run_score
 from pipelines.stages.settings import Setting

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,9 +12,10 @@ from numpy.typing import NDArray
 
 from datasets.rows import numbers
 from datasets.schema import COMPONENTS
+from eposit import Status
 from eposit.arrays import Array, Mask
 from pipelines.stages.failures import HIDDEN
-from pipelines.statistics import FEW, bootstrap, median, percentile95, rate
+from pipelines.statistics import FEW, Interval, bootstrap, median, rate, student, tail
 
 ERRORS = {
     "rotation_error_deg": "rotation, deg",
@@ -26,7 +28,9 @@ ERRORS = {
     "t_error_relative": "translation, relative",
     "reprojection_rmse_px": "reprojection, px",
 }
+SIGNED = tuple(name for name in ERRORS if name[:2] in ("rx", "ry", "rz", "tx", "ty", "tz"))
 SETTING = ("solver", "point_source", "assumed_camera", "point_set")
+EXACT = "exact"  # the assumed camera that is the true one
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,50 +38,78 @@ class Series:
     """Scores of one setting."""
 
     name: str
+    key: dict[str, str]  # its columns of SETTING
     frame_id: NDArray[np.int64]
     errors: dict[str, Array]  # column to values, NaN for failures
     normalised: Array  # (n, 6) errors over their stated standard deviations, NaN without
-    failed: Mask  # no pose, of a target that can be seen
+    status: NDArray[np.str_]  # HIDDEN where no pose could be found, as the target cannot be seen
     gross: Mask
+
+    @property
+    def failed(self) -> Mask:
+        """Rows without a pose, of a target that can be seen."""
+        return (self.status != Status.OK) & (self.status != HIDDEN)
+
+    @property
+    def position_mm(self) -> Array:
+        """Length of the translation error."""
+        return np.sqrt(sum(self.errors[f"t{axis}_error_mm"] ** 2 for axis in "xyz"))
+
+
+@dataclass(frozen=True, slots=True)
+class Error:
+    """One kind of error of one setting and camera, over the frames that were solved."""
+
+    label: str
+    median: Interval  # of absolute errors
+    tail: Interval | None  # their 95th percentile; None with too few frames
+    mean: Interval | None  # None for errors that have no sign
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """Scores of one setting through one camera."""
+
+    setting: str
+    camera: str
+    frames: int
+    n: int  # estimates: frames times draws
+    failed: int
+    gross: int
+    failed_rate: Interval
+    gross_rate: Interval
+    rotation_deg: Interval | None  # medians of absolute errors, None if all failed
+    position_mm: Interval | None
+    normalised: float  # RMS of the six errors over their stated standard deviations, NaN without
+    errors: tuple[Error, ...]  # none if all failed
 
 
 def series(scores: pa.Table) -> list[Series]:
     """One series for each setting, in the order of the table."""
-    names = [" ".join(key) for key in zip(*(scores[name].to_pylist() for name in SETTING), strict=True)]
+    keys = list(zip(*(scores[name].to_pylist() for name in SETTING), strict=True))
     found: list[Series] = []
-    for name in dict.fromkeys(names):
-        part = scores.filter(pa.array([other == name for other in names]))
+    for key in dict.fromkeys(keys):
+        part = scores.filter(pa.array([other == key for other in keys]))
         errors = dict(zip(ERRORS, numbers(part, *ERRORS).T, strict=True))
         outcome = zip(part["status"].to_pylist(), part["failure_reason"].to_pylist(), strict=True)
-        failed = np.array([status != "ok" and reason != HIDDEN for status, reason in outcome])
+        status = np.array([HIDDEN if reason == HIDDEN else status for status, reason in outcome], str)
         gross = np.array(part["gross_failure"].to_pylist())
         normalised = numbers(part, *(f"{component}_normalised" for component in COMPONENTS))
-        found.append(Series(name, part["frame_id"].to_numpy(), errors, normalised, failed, gross))
+        named: dict[str, str] = dict(zip(SETTING, key, strict=True))
+        found.append(Series(" ".join(key), named, part["frame_id"].to_numpy(), errors, normalised, status, gross))
     return found
 
 
-def score_rows(found: list[Series], cameras: dict[int, str]) -> list[dict[str, Any]]:
-    """Medians and 95th percentiles of absolute errors, and failures, for each setting and camera, with intervals.
+def cells(found: list[Series], cameras: dict[int, str]) -> list[Cell]:
+    """Errors and failures for each setting and camera, with intervals over the frames; a frame's draws stay together.
 
-    The intervals are bootstrapped over the frames; the draws of a frame stay together.
+    cameras: by frame_id.
     """
-    rows: list[dict[str, Any]] = []
-    for item in found:
-        camera = np.array([cameras[int(frame)] for frame in item.frame_id])
-        for name in dict.fromkeys(camera.tolist()):
-            mask = camera == name
-            order = np.flatnonzero(mask)[np.argsort(item.frame_id[mask], kind="stable")]
-            by_frame = order.reshape(len(np.unique(item.frame_id[mask])), -1)  # every frame has all draws
-            failed, gross = item.failed[by_frame], item.gross[by_frame]
-            row: dict[str, Any] = {"setting": item.name, "camera": name, "n": order.size}
-            row |= {"failed": int(failed.sum()), "gross": int(gross.sum())}
-            row |= {"failed_rate": rate(failed), "gross_rate": rate(gross)}
-            for column in ERRORS:
-                values = np.where(failed, np.nan, np.abs(item.errors[column][by_frame]))
-                both = [bootstrap(values, statistic, resamples=FEW) for statistic in (median, percentile95)]
-                row[column] = None if np.isnan(both[0].value) else both
-            rows.append(row)
-    return rows
+    return [
+        _cell(item, name, by_frame)
+        for item in found
+        for name, by_frame in _by_camera(item, np.array([cameras[int(frame)] for frame in item.frame_id]))
+    ]
 
 
 def normalised_rows(found: list[Series]) -> list[dict[str, Any]]:
@@ -88,3 +120,51 @@ def normalised_rows(found: list[Series]) -> list[dict[str, Any]]:
         if len(stated):
             rows.append({"setting": item.name, "n": len(stated), "rms": np.sqrt(np.mean(stated**2, axis=0)).tolist()})
     return rows
+
+
+def _by_camera(item: Series, camera: NDArray[np.str_]) -> Iterator[tuple[str, NDArray[np.intp]]]:
+    """Each camera, and (frames, draws) the rows of its frames: every frame has all draws."""
+    for name in dict.fromkeys(camera.tolist()):
+        own = np.flatnonzero(camera == name)
+        order = own[np.argsort(item.frame_id[own], kind="stable")]
+        yield name, order.reshape(len(np.unique(item.frame_id[own])), -1)
+
+
+def _cell(item: Series, camera: str, by_frame: NDArray[np.intp]) -> Cell:
+    failed, gross = item.failed[by_frame], item.gross[by_frame]
+    errors = {name: np.where(failed, np.nan, values[by_frame]) for name, values in item.errors.items()}
+    solved = not np.all(failed)
+    normalised = item.normalised[by_frame]
+    known = np.all(np.isfinite(normalised), axis=-1)
+    return Cell(
+        item.name,
+        camera,
+        len(by_frame),
+        by_frame.size,
+        int(failed.sum()),
+        int(gross.sum()),
+        rate(failed),
+        rate(gross),
+        _median(errors["rotation_error_deg"]) if solved else None,
+        _median(np.where(failed, np.nan, item.position_mm[by_frame])) if solved else None,
+        float(np.sqrt(np.mean(normalised[known] ** 2))) if np.any(known) else np.nan,
+        tuple(_error(name, values) for name, values in errors.items()) if solved else (),
+    )
+
+
+def _error(name: str, values: Array) -> Error:
+    """values: (frames, draws)"""
+    mean = student(frame_means(values)) if name in SIGNED else None
+    return Error(ERRORS[name], _median(np.abs(values)), tail(np.abs(values)), mean)
+
+
+def _median(values: Array) -> Interval:
+    return bootstrap(values, median, resamples=FEW)
+
+
+def frame_means(values: Array) -> Array:
+    """(f,) mean of all that a frame has, of (f, ...) values; NaN where it has none."""
+    flat = values.reshape(len(values), -1)
+    count = np.sum(np.isfinite(flat), axis=1)
+    with np.errstate(invalid="ignore"):
+        return np.nansum(flat, axis=1) / count

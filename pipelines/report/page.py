@@ -1,28 +1,28 @@
-"""Stage 5: `report.html`, self-contained: pictures, curves, boxes, tables, and what was run."""
+"""Stage 5: `report.html`, one file: what was found in sentences, frames, tables, figures, and what was run."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from datasets.rows import decode_image, of_detector, points_by_frame
-from datasets.schema import COMPONENTS
 from datasets.store.atomic import write_text
 from datasets.store.dataset import RECIPE_FILE, Dataset
-from eposit.arrays import Array
 from pipelines.detection import Detector
 from pipelines.machine import versions
-from pipelines.report import figures
-from pipelines.report.data import ERRORS, normalised_rows, score_rows, series
-from pipelines.report.points import field_rows, point_errors, tilt_rows
-from pipelines.report.template import rendered
-from render.targets.image_region import Region
+from pipelines.pages.frames import REGION
+from pipelines.pages.sections import Drawing
+from pipelines.pages.template import rendered
+from pipelines.report import figures, pictures
+from pipelines.report.data import Cell, Series, cells, normalised_rows, series
+from pipelines.report.points import PointErrors, field_rows, point_errors, tilt_rows
+from pipelines.report.run import Run
+from pipelines.report.summary import summarised
+from pipelines.report.tables import field_table, normalised_table
+from pipelines.statistics import LEAST_FOR_TAIL
 
 REPORT = "report.html"
 TEMPLATE = Path(__file__).with_name("page.html")
-GALLERY = 15  # pictures at most
+COLUMNS = ("frame_id", "pose_id", "time_s", "camera_name", "tilt_deg", "cx_px", "cy_px", *REGION)
 
 
 def write_report(dataset: Dataset) -> Path:
@@ -31,17 +31,7 @@ def write_report(dataset: Dataset) -> Path:
     Raises:
         UserError: a stage is missing or a shard damaged.
     """
-    columns = [
-        "frame_id",
-        "time_s",
-        "camera_name",
-        "tilt_deg",
-        "cx_px",
-        "cy_px",
-        *(f"region_{a}_px" for a in Region._fields),
-    ]
-    frames = dataset.read("frames", columns).to_pylist()
-    by_id = {frame["frame_id"]: frame for frame in frames}
+    frames = dataset.read("frames", list(COLUMNS)).to_pylist()
     found = series(dataset.read("scores"))
     # Who scores a whole system of their own may have detected nothing.
     points = point_errors(dataset, frames) if dataset.shards("detections") else []
@@ -50,17 +40,10 @@ def write_report(dataset: Dataset) -> Path:
         recipe=dataset.recipe,
         recipe_text=(dataset.root / RECIPE_FILE).read_text(encoding="utf-8"),
         frames=frames,
-        gallery=_gallery(dataset, frames),
-        detection=tilt_rows(points, frames),
-        field=field_rows(points, frames),
-        components=COMPONENTS,
-        normalised=normalised_rows(found),
-        series=[
-            {"name": item.name, "helix": figures.along_helix(item, by_id), "boxes": figures.boxes(item, by_id)}
-            for item in found
-        ],
-        errors=ERRORS,
-        scores=score_rows(found, {frame["frame_id"]: frame["camera_name"] for frame in frames}),
+        summary=summarised(Run(dataset.recipe, frames, points, found)),
+        **_frames(dataset, frames, points, found),
+        **_detection(points, frames),
+        **_poses(found, frames),
         versions=versions(),
     )
     path = dataset.root / REPORT
@@ -68,25 +51,47 @@ def write_report(dataset: Dataset) -> Path:
     return path
 
 
-def _gallery(dataset: Dataset, frames: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Evenly chosen frames with their detected points."""
-    chosen = {frames[int(i)]["frame_id"] for i in np.linspace(0, len(frames) - 1, min(GALLERY, len(frames))).round()}
-    points: dict[int, Array] = {}
-    if dataset.shards("detections"):
-        points = points_by_frame(of_detector(dataset.read("detections"), Detector.EDGE_FIT), dataset.recipe.target)
-    none = np.full((len(dataset.recipe.target.points), 2), np.nan)
-    pictures: list[dict[str, Any]] = []
-    for path in dataset.shards("frames"):
-        ids = dataset.read_shard(path, ["frame_id"])["frame_id"].to_pylist()
-        if chosen.isdisjoint(ids):
-            continue
-        for frame_id, image in zip(ids, dataset.read_shard(path, ["image"])["image"].to_pylist(), strict=True):
-            if frame_id not in chosen:
-                continue
-            frame = next(frame for frame in frames if frame["frame_id"] == frame_id)
-            region = Region(*(frame[f"region_{a}_px"] for a in Region._fields))
-            marked = points.get(frame_id, none)
-            svg = figures.picture(decode_image(image, path, frame_id), region, marked)
-            found = int(np.isfinite(marked[:, 0]).sum())
-            pictures.append({**frame, "svg": svg, "found": found, "total": len(marked)})
-    return pictures
+def _frames(
+    dataset: Dataset, frames: list[dict[str, Any]], points: list[PointErrors], found: list[Series]
+) -> dict[str, Any]:
+    """The frames that are shown, with the points of our detector, or of the first if ours has none."""
+    ours = [item for item in points if item.detector == Detector.EDGE_FIT]
+    item = next(iter(ours or points), None)
+    chosen = {"usual": pictures.usual(frames, item), "worst": pictures.worst(frames, item, found)}
+    return {name: pictures.drawings(dataset, frames, own, item, large=name == "usual") for name, own in chosen.items()}
+
+
+def _detection(points: list[PointErrors], frames: list[dict[str, Any]]) -> dict[str, Any]:
+    return {
+        "detection": tilt_rows(points, frames),
+        "detectors": len(points),
+        "field": field_table(field_rows(points, frames)) if points else None,
+    }
+
+
+def _poses(found: list[Series], frames: list[dict[str, Any]]) -> dict[str, Any]:
+    by_id = {frame["frame_id"]: frame for frame in frames}
+    rows = cells(found, {frame["frame_id"]: frame["camera_name"] for frame in frames})
+    normalised = normalised_rows(found)
+    return {
+        "cells": rows,
+        "kinds": _kinds(rows),
+        "tails": any(error.tail for row in rows for error in row.errors),
+        "least_for_tail": LEAST_FOR_TAIL,
+        "normalised": normalised_table(normalised) if normalised else None,
+        "figures": [
+            (
+                item.name,
+                Drawing("Rotation and depth error along the trajectory", figures.along_helix(item, by_id)),
+                Drawing("Errors by component, a box for each camera", figures.boxes(item, by_id)),
+            )
+            for item in found
+        ],
+    }
+
+
+def _kinds(rows: list[Cell]) -> list[tuple[str, str]]:
+    """What the table of poses can be narrowed to, with the texts."""
+    settings = dict.fromkeys(row.setting for row in rows)
+    failures = [("failed", "with failures")] if any(row.failed or row.gross for row in rows) else []
+    return failures + [(f"setting-{i}", name) for i, name in enumerate(settings)]

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from datasets.rows import covariances_by_frame, numbers, of_detector, points_by_frame
 from datasets.store.dataset import Dataset
 from eposit.arrays import Array, Mask
+from pipelines.report.data import frame_means
+from pipelines.statistics import Interval, root, student
 
 STEEP_DEG = 45.0
 ANGLE_STEP_DEG = 15.0  # of the field-angle table; each row is centred on a multiple
@@ -20,7 +22,10 @@ LEAST_SIDE_PX = 20.0  # local square below which corners stand in a row of their
 
 @dataclass(frozen=True, slots=True)
 class PointErrors:
-    """Errors of one detector: f frames of n points, the circle last."""
+    """Errors of one detector: f frames of n points, the circle last.
+
+    Of a target without a raised circle the points of the print are the corners, and the last place is empty: NaN.
+    """
 
     detector: str
     error: Array  # (f, n, 2) detected minus true, px; NaN where there is none
@@ -47,7 +52,7 @@ def point_errors(dataset: Dataset, frames: list[dict[str, Any]]) -> list[PointEr
     centre = np.array([[frame["cx_px"], frame["cy_px"]] for frame in frames])
     radius = true - centre[:, None]
     radius /= np.maximum(np.linalg.norm(radius, axis=-1, keepdims=True), 1e-9)
-    along, side = _board_directions(true, target.inner)
+    along, side = _board_directions(true, target.point_grid)
     errors: list[PointErrors] = []
     for detector in dict.fromkeys(found["detector"].to_pylist()):
         rows = of_detector(found, detector)
@@ -56,12 +61,9 @@ def point_errors(dataset: Dataset, frames: list[dict[str, Any]]) -> list[PointEr
         status = rows["status"].to_numpy(zero_copy_only=False).astype(str).reshape(-1, n)
         made_up = np.isfinite(error[..., 0]) & ~visible
         error[made_up] = np.nan
-        radial, along_x = np.sum(error * radius, axis=-1), np.sum(error * along, axis=-1)
-        errors.append(
-            PointErrors(
-                detector, error, _whitened(error, covariance), radial, along_x, theta, side, inside, made_up, status
-            )
-        )
+        radial, along_x = np.sum(error * radius, axis=-1), np.sum(error * along[:, :n], axis=-1)
+        values = (error, _whitened(error, covariance), radial, along_x, theta, side, inside, made_up, status)
+        errors.append(PointErrors(detector, *(_with_circle(item, along.shape[1]) for item in values)))
     return errors
 
 
@@ -81,7 +83,16 @@ def tilt_rows(errors: list[PointErrors], frames: list[dict[str, Any]]) -> list[d
                     found = np.isfinite(item.error[mask, :-1, 0]).any(axis=1)
                     counts = {"frames": int(mask.sum()), "boards": int(found.sum()), "made_up": made_up}
                     rows.append(
-                        {"detector": item.detector, "camera": name, "tilt": label, **counts, **_row(item, mask)}
+                        {
+                            "detector": item.detector,
+                            "camera": name,
+                            "tilt": label,
+                            **counts,
+                            **_row(item, mask),
+                            "rms_interval": root_mean_square(item.error[mask, :-1]),
+                            "bias": bias(item, mask),
+                            "circle_interval": root_mean_square(item.error[mask, -1:]),
+                        }
                     )
     return rows
 
@@ -127,6 +138,18 @@ def _angle_bands(theta: Array, own: Mask) -> Iterator[tuple[float, Mask]]:
             yield float(angle), near
 
 
+def bias(item: PointErrors, frames: Mask) -> dict[str, Interval]:
+    """Mean corner error of some frames along x, y and the radius, px, with intervals over the frames."""
+    corners = item.error[frames, :-1]
+    values = {"x": corners[..., 0], "y": corners[..., 1], "radius": item.radial[frames, :-1]}
+    return {name: student(frame_means(each)) for name, each in values.items()}
+
+
+def root_mean_square(values: Array) -> Interval:
+    """Of (f, ...) values, with an interval over the frames; all count alike, NaN values take no part."""
+    return root(student(frame_means(values**2)))
+
+
 def _row(item: PointErrors, mask: Mask) -> dict[str, Any]:
     ok = np.isfinite(item.error[mask, :, 0])
     corners, circle = item.error[mask, :-1][ok[:, :-1]], item.error[mask, -1][ok[:, -1]]
@@ -146,10 +169,22 @@ def _row(item: PointErrors, mask: Mask) -> dict[str, Any]:
     }
 
 
+def _with_circle(values: NDArray[Any], places: int) -> NDArray[Any]:
+    """(f, places, ...) values of (f, n, ...), with an empty last place where the target has no circle."""
+    missing = places - values.shape[1]
+    if missing <= 0:
+        return values
+    empty = np.zeros((len(values), missing, *values.shape[2:]), values.dtype)
+    return np.concatenate((values, np.full_like(empty, np.nan) if values.dtype.kind == "f" else empty), axis=1)
+
+
 def _board_directions(true: Array, inner: tuple[int, int]) -> tuple[Array, Array]:
-    """(f, n, 2) unit image of the board's x and (f, n) side of the local square, by differences of true corners."""
+    """(f, n, 2) unit image of the board's x and (f, n) side of the local square, by differences of true points.
+
+    n counts the points of the print and a circle behind them.
+    """
     across, down = inner
-    grid = true[:, :-1].reshape(-1, down, across, 2)
+    grid = true[:, : across * down].reshape(-1, down, across, 2)
     along_y, along_x = np.gradient(grid, axis=(1, 2))
     area = np.abs(along_x[..., 0] * along_y[..., 1] - along_x[..., 1] * along_y[..., 0])
     unit = along_x / np.linalg.norm(along_x, axis=-1, keepdims=True)

@@ -22,9 +22,9 @@ from pipelines.adapters.results import PoseResult, stack
 from pipelines.adapters.user import attempt, check_call, load_function
 from pipelines.stages.estimate import path_of_shard
 from pipelines.stages.settings import ALL, IMAGE, System, assumed
-from render.targets.chessboard import Chessboard
+from render.targets.kinds import AnyTarget
 
-Estimator = Callable[[NDArray[np.uint8], Camera, Chessboard], Any]
+Estimator = Callable[[NDArray[np.uint8], Camera, AnyTarget], Any]
 
 
 def find_estimator(name: str) -> Estimator:

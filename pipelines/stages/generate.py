@@ -182,7 +182,10 @@ def _keypoints(recipe: Recipe, frame: Frame, visible: Mask | None) -> pa.Table:
     points, pixels = target.points, true_points(recipe, frame)
     in_cam = frame.cam_from_obj.apply(points)
     outline = pixels.copy()
-    outline[target.circle_index] = outline_centroid(camera.project(frame.cam_from_obj.apply(target.circle_rim())))
+    for point in range(len(points)):
+        rim = target.rim(point)
+        if rim is not None:
+            outline[point] = outline_centroid(camera.project(frame.cam_from_obj.apply(rim)))
     return table(
         KEYPOINTS,
         {

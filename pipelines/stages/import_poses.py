@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any
 
@@ -44,16 +44,8 @@ def import_poses(dataset: Dataset, path: Path, system: System) -> int:
     Raises:
         UserError: a name that is not usable, a file that cannot be read, or poses that are wrong.
     """
-    _check_name(system.name)
-    answers = read_poses(path)
-    known = set(dataset.read("frames", [FRAME])[FRAME].to_pylist())
-    unknown = sorted(set(answers) - known)
-    if unknown:
-        more = f" and {len(unknown) - 1} more" if len(unknown) > 1 else ""
-        raise UserError(
-            f"{path} has frame_id {unknown[0]}{more}, which {dataset.root} has not; its frames are {min(known)} to "
-            f"{max(known)}"
-        )
+    known = dataset.read("frames", [FRAME])[FRAME].to_pylist()
+    answers = poses_of(path, system, known, str(dataset.root))
     count = shard_count(dataset.recipe)
     for index in range(count):
         ids = dataset.read_shard(dataset.shard_path("frames", index, count), [FRAME])[FRAME].to_pylist()
@@ -63,7 +55,25 @@ def import_poses(dataset: Dataset, path: Path, system: System) -> int:
             score.forget(dataset, shard)
             dataset.write_shard(shard, rows)
     dataset.write_manifest()
-    return len(known - set(answers))
+    return len(set(known) - set(answers))
+
+
+def poses_of(path: Path, system: System, known: Collection[int], where: str) -> dict[int, PoseResult]:
+    """frame_id to pose of a file for a dataset with some frames. where: names the dataset.
+
+    Raises:
+        UserError: a name that is not usable, a file that cannot be read, poses that are wrong, or an unknown frame.
+    """
+    _check_name(system.name)
+    answers = read_poses(path)
+    unknown = sorted(set(answers).difference(known))
+    if unknown:
+        more = f" and {len(unknown) - 1} more" if len(unknown) > 1 else ""
+        raise UserError(
+            f"{path} has frame_id {unknown[0]}{more}, which {where} has not; its frames are {min(known)} to "
+            f"{max(known)}"
+        )
+    return answers
 
 
 def _check_name(name: str) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from render import backend
+from render.analytic.device_print import DevicePrint
 from render.analytic.device_target import DeviceAxis, DeviceTarget
 from render.analytic.edge_coverage import half_range, positive_share
 from render.analytic.plane_hit import PlaneHit, Steps
@@ -85,7 +86,7 @@ def _sample_axis(target: DeviceTarget, axis: DeviceAxis, value: DeviceFloat, all
     )
 
 
-def linear_steps(steps: Steps, target: DeviceTarget) -> Steps:
+def linear_steps(steps: Steps, target: DeviceTarget | DevicePrint) -> Steps:
     """Changes over a cell, or none where they are too large to be taken for linear: near a plane's horizon."""
     dr = backend.jit()
     linear = half_range(*steps) <= LINEAR_SQUARES * target.square

@@ -11,10 +11,13 @@ from dataclasses import dataclass
 
 from render import backend
 from render.analytic.board_reflectance import EDGE_REACH, MANY_EDGES, SMOOTH, linear_steps, sample_board
+from render.analytic.device_print import DevicePrint
 from render.analytic.device_target import DeviceTarget, shading_at
 from render.analytic.edge_coverage import half_range, positive_share
 from render.analytic.plane_hit import PlaneHit, distance_from, meet_plane
-from render.analytic.rays import DeviceCamera
+from render.analytic.print_reflectance import sample_print
+from render.analytic.rays import DeviceCamera, RayBundle
+from render.analytic.sheet_hit import meet_sheet
 from render.device import DeviceBool, DeviceFloat, DeviceIndex
 
 
@@ -28,11 +31,27 @@ class CellSample:
 
 
 def sample_cells(
-    target: DeviceTarget, camera: DeviceCamera, x_px: DeviceFloat, y_px: DeviceFloat, size: DeviceFloat
+    target: DeviceTarget | DevicePrint, camera: DeviceCamera, x_px: DeviceFloat, y_px: DeviceFloat, size: DeviceFloat
 ) -> CellSample:
     """What cells see whose centres are at x_px, y_px and whose sides are `size`, px."""
-    mi, dr = backend.load(), backend.jit()
     rays = camera.rays(x_px, y_px)
+    sample = _sample_print if isinstance(target, DevicePrint) else _sample_chessboard
+    return sample(target, camera, rays, size)
+
+
+def _sample_print(target: DevicePrint, camera: DeviceCamera, rays: RayBundle, size: DeviceFloat) -> CellSample:
+    """A printed board, which may be bent."""
+    mi, dr = backend.load(), backend.jit()
+    hit, front = meet_sheet(camera, rays, target.sheet, size)
+    board = sample_print(target, hit)
+    share = dr.select(hit.met & rays.seen, board.share, 0.0)
+    radiance = dr.select(front, share * board.reflectance * shading_at(target, hit.x, hit.y), 0.0)
+    return CellSample(radiance, share, mi.UInt32(dr.select(hit.met, board.edges, SMOOTH)))
+
+
+def _sample_chessboard(target: DeviceTarget, camera: DeviceCamera, rays: RayBundle, size: DeviceFloat) -> CellSample:
+    """The flat chessboard and its raised circle."""
+    mi, dr = backend.load(), backend.jit()
     disc, rim, within_disc = _sample_disc(target, meet_plane(camera, rays, target.disc.z, size))
     hit = meet_plane(camera, rays, 0.0, size)
     board = sample_board(target, hit)

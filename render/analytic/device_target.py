@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from render import backend
+from render.analytic.device_print import DevicePrint, device_print
 from render.device import DeviceFloat
 from render.light import Light, shading_map, shadow_radius
 from render.targets.chessboard import Chessboard
+from render.targets.kinds import AnyTarget
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +75,12 @@ def device_target(target: Chessboard, light: Light) -> DeviceTarget:
     )
 
 
-def shading_at(target: DeviceTarget, x: DeviceFloat, y: DeviceFloat) -> DeviceFloat:
+def device_scene(target: AnyTarget, light: Light) -> DeviceTarget | DevicePrint:
+    """The target under its light, uploaded once."""
+    return device_target(target, light) if isinstance(target, Chessboard) else device_print(target, light)
+
+
+def shading_at(target: DeviceTarget | DevicePrint, x: DeviceFloat, y: DeviceFloat) -> DeviceFloat:
     """Radiance over reflectance at points of the board, mm: bilinear in the map, clamped at its border."""
     mi, dr = backend.load(), backend.jit()
     columns, rows = target.x.texels, target.y.texels

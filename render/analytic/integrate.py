@@ -19,27 +19,28 @@ from eposit import Camera, Pose
 from render import backend
 from render.analytic.board_reflectance import MANY_EDGES, ONE_EDGE, SMOOTH
 from render.analytic.cells import sample_cells
-from render.analytic.device_target import DeviceTarget, device_target
+from render.analytic.device_print import DevicePrint
+from render.analytic.device_target import DeviceTarget, device_scene
 from render.analytic.image_circle import device_coverage
 from render.analytic.rays import DeviceCamera, device_camera
 from render.device import DeviceBool, DeviceFloat, DeviceIndex, DeviceInt
 from render.light import Light
-from render.targets.chessboard import Chessboard
 from render.targets.image_region import Region
+from render.targets.kinds import AnyTarget
 
 CHUNK = 1 << 23  # cells in flight; a cell takes 8 bytes
 ONE_EDGE_CELLS = 4  # a single straight edge needs one cell; four follow its bend and the light along it
 
 
 def integrate_region(
-    target: Chessboard, light: Light, camera: Camera, cam_from_obj: Pose, region: Region, samples: int
+    target: AnyTarget, light: Light, camera: Camera, cam_from_obj: Pose, region: Region, samples: int
 ) -> NDArray[np.float32]:
     """(height, width) mean radiance of the pixels of a region.
 
     samples: cells of a pixel that several edges cross, a square number.
     """
     mi, dr = backend.load(), backend.jit()
-    scene = device_target(target, light), device_camera(camera, cam_from_obj)
+    scene = device_scene(target, light), device_camera(camera, cam_from_obj)
     background = dr.opaque(mi.Float, light.background)
     place = _DeviceRegion(*(dr.opaque(mi.Int32, value) for value in region[:3]))
     centres = place.pixel_centres(dr.arange(mi.Int32, region.width * region.height))
@@ -93,7 +94,7 @@ def _chunks(chosen: DeviceBool, size: int) -> Iterator[DeviceIndex]:
 
 
 def _mean_of_cells(
-    target: DeviceTarget, camera: DeviceCamera, centres: tuple[DeviceFloat, DeviceFloat], cells: int
+    target: DeviceTarget | DevicePrint, camera: DeviceCamera, centres: tuple[DeviceFloat, DeviceFloat], cells: int
 ) -> tuple[DeviceFloat, DeviceFloat]:
     """Mean radiance and mean share of the target of pixels, each divided into `cells`."""
     mi, dr = backend.load(), backend.jit()

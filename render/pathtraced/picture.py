@@ -13,8 +13,8 @@ from render import backend
 from render.colour import luminance
 from render.light import Light
 from render.pathtraced.tiles import Film, Tracer, trace_region
-from render.targets.chessboard import Chessboard
 from render.targets.image_region import Region
+from render.targets.kinds import AnyTarget
 from render.world import World, WorldDraw
 from render.world.compose import WHOLE, Parts, load_scene
 
@@ -34,7 +34,7 @@ class Viewpoint:
 
 
 def trace_picture(
-    world: World, draw: WorldDraw, target: Chessboard, light: Light, view: Viewpoint, near: Region, region: Region
+    world: World, draw: WorldDraw, target: AnyTarget, light: Light, view: Viewpoint, near: Region, region: Region
 ) -> Film:
     """(height, width, 4) linear RGB and share of hits of a region; 1 is a matt white board there, on the mean.
 
@@ -54,7 +54,7 @@ def trace_picture(
 
 
 @functools.lru_cache(maxsize=1)
-def prepared(world: World, draw: WorldDraw, target: Chessboard, light: Light) -> tuple[Tracer, float]:
+def prepared(world: World, draw: WorldDraw, target: AnyTarget, light: Light) -> tuple[Tracer, float]:
     """A world's scene with its path tracer, and what its radiance is multiplied with.
 
     The scene before this one is freed first, and so is the one with the card: Dr.Jit numbers what is alive, and only
@@ -68,7 +68,7 @@ def prepared(world: World, draw: WorldDraw, target: Chessboard, light: Light) ->
     return tracer_of(world, draw, target, light), gain
 
 
-def tracer_of(world: World, draw: WorldDraw, target: Chessboard, light: Light, parts: Parts = WHOLE) -> Tracer:
+def tracer_of(world: World, draw: WorldDraw, target: AnyTarget, light: Light, parts: Parts = WHOLE) -> Tracer:
     """A world's scene with its path tracer."""
     scene, composition = load_scene(world, draw, target, light, parts)
     kind = "volpath" if composition.has_medium else "path"
@@ -76,7 +76,7 @@ def tracer_of(world: World, draw: WorldDraw, target: Chessboard, light: Light, p
     return Tracer(scene, backend.load().load_dict(settings), composition)
 
 
-def metered_gain(world: World, draw: WorldDraw, target: Chessboard, light: Light) -> float:
+def metered_gain(world: World, draw: WorldDraw, target: AnyTarget, light: Light) -> float:
     """What radiance in a world is multiplied with, so that 1 is a matt white card in the target's place, on the mean.
 
     The studio's light is stated on this scale already: 1.
@@ -92,7 +92,7 @@ def metered_gain(world: World, draw: WorldDraw, target: Chessboard, light: Light
     return 1.0 / mean
 
 
-def _card_radiance(tracer: Tracer, target: Chessboard) -> NDArray[np.float32]:
+def _card_radiance(tracer: Tracer, target: AnyTarget) -> NDArray[np.float32]:
     """(n, 3) radiance of points of the card, seen along its normal."""
     mi, dr = backend.load(), backend.jit()
     x0, x1, y0, y1 = target.extent_mm

@@ -9,7 +9,7 @@ import functools
 
 from render.device import DeviceScene
 from render.light import Light
-from render.targets.chessboard import Chessboard
+from render.targets.kinds import AnyTarget
 from render.world.boards import target_shapes
 from render.world.compose import load_objects
 from render.world.materials import Material, surface
@@ -17,13 +17,13 @@ from render.world.studio import studio
 
 
 @functools.lru_cache(maxsize=4)
-def bare_scene(target: Chessboard) -> DeviceScene:
+def bare_scene(target: AnyTarget) -> DeviceScene:
     """The target's shapes and reflectance without any light, for rays that only ask what they hit."""
     return load_objects(target_shapes(target, _matt))
 
 
 @functools.lru_cache(maxsize=4)
-def reference_scene(target: Chessboard, light: Light) -> DeviceScene:
+def reference_scene(target: AnyTarget, light: Light) -> DeviceScene:
     """The same board under a real lamp and a real surrounding, for Mitsuba's own integrator: the oracle."""
     integrator = {"type": "direct", "emitter_samples": 4, "bsdf_samples": 0, "hide_emitters": True}
     return load_objects({"integrator": integrator, **target_shapes(target, _matt), **studio(target, light)})

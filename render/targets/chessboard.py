@@ -8,12 +8,15 @@ white square.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eposit.arrays import Array
+from render.targets import PATTERN_MEANING
+from render.targets.lattice import Lattice, chess_lattice
+from render.targets.sheet import Sheet
 
 CIRCLE = "circle"
 MAX_SQUARES, MAX_MARGIN = 24, 3.0  # the map of the light has 100 x 100 points in a square
@@ -27,6 +30,7 @@ class Chessboard:
         ValueError: a board that is too small, symmetric under half a turn, or a circle that does not fit its square.
     """
 
+    pattern: Annotated[Literal["chessboard"], PATTERN_MEANING] = "chessboard"
     columns: Annotated[int, "squares along x"] = 10
     rows: Annotated[int, "squares along y"] = 7
     square_mm: Annotated[float, "side of a square, mm"] = 100.0
@@ -76,6 +80,11 @@ class Chessboard:
         return self.columns - 1, self.rows - 1
 
     @property
+    def point_grid(self) -> tuple[int, int]:
+        """Columns and rows of the inner corners."""
+        return self.inner
+
+    @property
     def corners(self) -> Array:
         """(n, 3) inner corners, mm, x fastest."""
         across, down = self.inner
@@ -109,6 +118,24 @@ class Chessboard:
         margin = (1.0 + self.margin_squares) * self.square_mm
         width, height = (self.columns - 2) * self.square_mm, (self.rows - 2) * self.square_mm
         return -margin, width + margin, -margin, height + margin
+
+    @property
+    def front_mm(self) -> float:
+        """Least z of the target, mm: the circle's."""
+        return -self.circle_height_mm
+
+    @property
+    def sheet(self) -> Sheet:
+        """The flat board with its margin."""
+        return Sheet(self.extent_mm)
+
+    def lattice(self) -> Lattice:
+        """A cell for each square."""
+        return chess_lattice(self.columns, self.rows, self.square_mm)
+
+    def rim(self, point: int) -> Array | None:
+        """(n, 3) outline, mm, of what the point is the centre of: the circle's rim; None for a corner."""
+        return self.circle_rim() if point == self.circle_index else None
 
     def index(self, point: str | tuple[int, int]) -> int:
         """Row in `points` of "circle" or of an inner corner (column, row), from 0.
@@ -149,6 +176,5 @@ class Chessboard:
 
     def reflectance(self) -> NDArray[np.float32]:
         """Reflectance, one texel per square with the margin as one ring of texels, row 1 first."""
-        column, row = np.meshgrid(np.arange(self.columns), np.arange(self.rows))
-        squares = np.where((column + row) % 2 == 0, self.black, self.white)
+        squares = np.where(self.lattice().black, self.black, self.white)
         return np.pad(squares, 1, constant_values=self.white).astype(np.float32)

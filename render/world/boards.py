@@ -9,56 +9,37 @@ import numpy as np
 from eposit.arrays import Array
 from render import backend
 from render.targets.chessboard import Chessboard
+from render.targets.kinds import AnyTarget
+from render.targets.mesh import Mesh, board_mesh
 from render.world.materials import Material, diffuse
-from render.world.shapes import FRONT, RIGHT, UP, Objects, Shape, box, frame_matrix, pole
+from render.world.shapes import FRONT, RIGHT, UP, MeshShape, Objects, Shape, box, frame_matrix, pole
 
 BOARD, CIRCLE = "board", "circle"
 BACK = (0.3, 0.3, 0.3)  # reflectance of a board's back
 Coat = Callable[[Material], Material]  # from a reflectance to the surface that has it
 
 
-def target_shapes(target: Chessboard, coat: Coat) -> Objects:
-    """Board and circle, seen from the front. The circle is of matt paper on every board."""
-    return {BOARD: board_shape(target, coat), CIRCLE: circle_shape(target)}
-
-
-def board_shape(target: Chessboard, coat: Coat) -> Shape:
-    """The flat board with its margin."""
-    mi = backend.load()
-    x0, x1, y0, y1 = target.extent_mm
-    # One texel per square with one ring of margin, clamped beyond: the texture's extent differs from the board's.
-    square = target.square_mm
-    width, height = (target.columns + 2) * square, (target.rows + 2) * square
-    transform = mi.ScalarTransform4f
-    to_uv = transform().translate([(x0 + 2.0 * square) / width, (y0 + 2.0 * square) / height, 0.0])
-    to_uv = to_uv @ transform().scale([(x1 - x0) / width, (y1 - y0) / height, 1.0])
-    reflectance = {
-        "type": "bitmap",
-        "bitmap": mi.Bitmap(target.reflectance()[..., None]),
-        "raw": True,
-        "filter_type": "nearest",
-        "wrap_mode": "clamp",
-        "to_uv": to_uv,
-    }
-    half_x, half_y, centre = np.zeros(3), np.zeros(3), np.zeros(3)
-    half_x[0], half_y[1], centre[:2] = (x1 - x0) / 2.0, (y1 - y0) / 2.0, ((x0 + x1) / 2.0, (y0 + y1) / 2.0)
-    return _facing_camera("rectangle", frame_matrix(half_x, half_y, -FRONT, centre), coat(reflectance))
+def target_shapes(target: AnyTarget, coat: Coat) -> Objects:
+    """The printed board, and the raised circle of a target that has one, which is of matt paper on every board."""
+    mesh = board_mesh(target)
+    board = {BOARD: MeshShape(mesh, coat(_print(mesh)))}
+    return board | ({CIRCLE: circle_shape(target)} if isinstance(target, Chessboard) else {})
 
 
 def circle_shape(target: Chessboard) -> Shape:
-    """The raised disc."""
+    """The raised disc, seen from the front."""
     radius = target.circle_radius_mm
     matrix = frame_matrix(radius * RIGHT, -radius * UP, -FRONT, target.circle_centre)
     paper = {"type": "diffuse", "reflectance": {"type": "uniform", "value": target.circle}}
-    return _facing_camera("disk", matrix, paper)
+    return {"type": "disk", "flip_normals": True, "to_world": matrix, "bsdf": paper}
 
 
-def card_shapes(target: Chessboard) -> Objects:
+def card_shapes(target: AnyTarget) -> Objects:
     """A matt card as white as the board in the board's place, to meter light on."""
-    return {BOARD: board_shape(target, lambda _: diffuse((target.white, target.white, target.white)))}
+    return {BOARD: MeshShape(board_mesh(target), diffuse((target.white, target.white, target.white)))}
 
 
-def stand_shapes(target: Chessboard, floor_mm: float) -> Objects:
+def stand_shapes(target: AnyTarget, floor_mm: float) -> Objects:
     """A thin plate behind the board, a pole and a foot, so that it does not float."""
     x0, x1, y0, y1 = target.extent_mm
     middle = target.board_centre + 30.0 * -FRONT
@@ -85,5 +66,12 @@ def other_board(columns: int, rows: int, square_mm: float, matrix: Array) -> Sha
     return {"type": "rectangle", "to_world": matrix @ scale, "bsdf": {"type": "twosided", "inner": front}}
 
 
-def _facing_camera(kind: str, matrix: Array, bsdf: Material) -> Shape:
-    return {"type": kind, "flip_normals": True, "to_world": matrix, "bsdf": bsdf}
+def _print(mesh: Mesh) -> Material:
+    """The texture of a printed board: a texel for each cell."""
+    return {
+        "type": "bitmap",
+        "bitmap": backend.load().Bitmap(mesh.reflectance[..., None]),
+        "raw": True,
+        "filter_type": "nearest",
+        "wrap_mode": "clamp",
+    }

@@ -13,7 +13,7 @@ from eposit.arrays import Array
 from render import backend
 from render.device import DeviceScene
 from render.light import Light
-from render.targets.chessboard import Chessboard
+from render.targets.kinds import AnyTarget
 from render.world.boards import card_shapes, stand_shapes, target_shapes
 from render.world.description import World
 from render.world.draw import WorldDraw
@@ -22,7 +22,7 @@ from render.world.materials import Material, surface
 from render.world.open_air import environment, sky
 from render.world.room import room
 from render.world.scene_file import SceneFileError
-from render.world.shapes import Objects
+from render.world.shapes import MeshShape, Objects
 from render.world.studio import studio
 from render.world.things import clutter, occluders, other_boards
 from render.world.user_scene import first_line, user_scene, world_from_obj
@@ -49,7 +49,7 @@ class Parts:
 WHOLE = Parts()
 
 
-def compose(world: World, draw: WorldDraw, target: Chessboard, light: Light, parts: Parts = WHOLE) -> Composition:
+def compose(world: World, draw: WorldDraw, target: AnyTarget, light: Light, parts: Parts = WHOLE) -> Composition:
     """One draw of a world with the target in it.
 
     The names `board` and `circle` are the target's. Every group of things has random numbers of its own, so that more
@@ -75,7 +75,7 @@ def compose(world: World, draw: WorldDraw, target: Chessboard, light: Light, par
 
 
 def load_scene(
-    world: World, draw: WorldDraw, target: Chessboard, light: Light, parts: Parts = WHOLE
+    world: World, draw: WorldDraw, target: AnyTarget, light: Light, parts: Parts = WHOLE
 ) -> tuple[DeviceScene, Composition]:
     """The composed scene, loaded.
 
@@ -86,9 +86,9 @@ def load_scene(
     return _loaded(composition.objects), composition
 
 
-def load_objects(objects: Objects) -> DeviceScene:
-    """A scene of objects in the object frame."""
-    return _loaded(_in_scene(objects, np.eye(4)))
+def load_objects(objects: Objects, matrix: Array | None = None) -> DeviceScene:
+    """A scene of objects of the object frame. matrix: (4, 4) to the scene's frame; None if that is the same."""
+    return _loaded(_in_scene(objects, np.eye(4) if matrix is None else matrix))
 
 
 def _loaded(objects: Objects) -> DeviceScene:
@@ -103,7 +103,7 @@ def _coat(world: World, draw: WorldDraw, reflectance: Material) -> Material:
     return surface(world.surface, draw.roughness, reflectance)
 
 
-def _surroundings(world: World, draw: WorldDraw, target: Chessboard, light: Light) -> Objects:
+def _surroundings(world: World, draw: WorldDraw, target: AnyTarget, light: Light) -> Objects:
     if world.surround == "studio":
         return studio(target, light)
     if world.surround == "room":
@@ -121,12 +121,38 @@ def _rng(draw: WorldDraw, group: int) -> np.random.Generator:
 
 
 def _in_scene(objects: Objects, matrix: Array) -> Objects:
-    """Descriptions with their matrices in the scene's frame and in Mitsuba's type; loaded objects stay."""
+    """Meshes and descriptions in the scene's frame and in Mitsuba's types; loaded objects stay."""
     transform = backend.load().ScalarTransform4f
 
     def placed(thing: Any) -> Any:
+        if isinstance(thing, MeshShape):
+            return _mesh_object(thing, matrix)
         if isinstance(thing, dict) and "to_world" in thing:
             return thing | {"to_world": transform(matrix @ thing["to_world"])}
         return thing
 
     return {name: placed(thing) for name, thing in objects.items()}
+
+
+def _mesh_object(shape: MeshShape, matrix: Array) -> Any:
+    """Mitsuba's mesh. A mesh that is made from arrays takes its BSDF as an object, in its properties."""
+    mi, mesh = backend.load(), shape.mesh
+    properties = mi.Properties()
+    properties["bsdf"] = mi.load_dict(shape.bsdf)
+    made = mi.Mesh(
+        "mesh",
+        vertex_count=len(mesh.vertices),
+        face_count=len(mesh.faces),
+        has_vertex_normals=True,
+        has_vertex_texcoords=True,
+        props=properties,
+    )
+    vertices = mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+    normals = mesh.normals @ np.linalg.inv(matrix[:3, :3])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    parameters = mi.traverse(made)
+    for name, values in (("positions", vertices), ("normals", normals), ("texcoords", mesh.uv)):
+        parameters[f"vertex_{name}"] = mi.Float(values.astype(np.float32).ravel())
+    parameters["faces"] = mi.UInt32(mesh.faces.astype(np.uint32).ravel())
+    parameters.update()
+    return made

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from eposit.arrays import Array
-from render.targets.chessboard import Chessboard
+from render.targets.kinds import AnyTarget
 from render.world.description import World
 from render.world.draw import WorldDraw
 from render.world.materials import asphalt, diffuse, random_colour, textured
@@ -17,7 +17,7 @@ BUILDINGS, TREES = 14, 10
 NEAREST_MM, FARTHEST_MM = 25e3, 120e3  # of buildings
 
 
-def sky(world: World, draw: WorldDraw, target: Chessboard, rng: np.random.Generator) -> Objects:
+def sky(world: World, draw: WorldDraw, target: AnyTarget, rng: np.random.Generator) -> Objects:
     """Sun and sky, ground, buildings and trees."""
     floor = target.board_centre - world.floor_mm * UP
     repeats = GROUND_MM / TEXTURE_MM

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from eposit.arrays import Array
-from render.targets.chessboard import Chessboard
+from render.targets.kinds import AnyTarget
 from render.world.description import World
 from render.world.draw import WorldDraw
 from render.world.materials import Material, bricks, diffuse, picture, planks, plaster, random_colour, textured, tiles
@@ -19,7 +19,7 @@ LAMP_SIZE_MM = (1400.0, 350.0)
 LAMP_GAP_MM = 40.0  # between a lamp and the ceiling
 
 
-def room(world: World, draw: WorldDraw, target: Chessboard, rng: np.random.Generator) -> Objects:
+def room(world: World, draw: WorldDraw, target: AnyTarget, rng: np.random.Generator) -> Objects:
     """Walls, floor, ceiling, lamps, furniture and pictures. Its middle lies in front of the target."""
     width, height, depth = world.room_mm
     floor = target.board_centre - world.floor_mm * UP
@@ -32,7 +32,7 @@ def room(world: World, draw: WorldDraw, target: Chessboard, rng: np.random.Gener
     }
 
 
-def contains(world: World, target: Chessboard, point: Array) -> bool:
+def contains(world: World, target: AnyTarget, point: Array) -> bool:
     """Whether a point of the object frame, mm, lies inside the room."""
     width, height, depth = world.room_mm
     from_floor = point - (target.board_centre - world.floor_mm * UP)

@@ -1,21 +1,31 @@
-"""Shapes of a world as Mitsuba descriptions whose `to_world` is a (4, 4) NumPy matrix in the object frame, mm.
+"""Shapes of a world: meshes, or Mitsuba descriptions with a (4, 4) NumPy matrix `to_world`, in the object frame, mm.
 
-`render.world.compose` turns the matrices into Mitsuba's and into the frame of the scene.
+`render.world.compose` turns them into Mitsuba's and into the frame of the scene.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any  # Any: Mitsuba describes a shape by dictionaries of mixed values
 
 import numpy as np
 
 from eposit.arrays import Array
+from render.targets.mesh import Mesh
 
 Shape = dict[str, Any]
-Objects = dict[str, Any]  # name to shape or emitter
+Objects = dict[str, Any]  # name to shape, mesh or emitter
 UP = np.array([0.0, -1.0, 0.0])  # of the world, in the object frame
 FRONT = np.array([0.0, 0.0, -1.0])  # out of the board, towards the camera
 RIGHT = np.array([1.0, 0.0, 0.0])
+
+
+@dataclass(frozen=True, slots=True)
+class MeshShape:
+    """Triangles with a surface, in the object frame."""
+
+    mesh: Mesh
+    bsdf: Shape
 
 
 def frame_matrix(x: Array, y: Array, z: Array, origin: Array) -> Array:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from render.light import Light, reference_irradiance
-from render.targets.chessboard import Chessboard
+from render.targets.kinds import AnyTarget
 from render.world.shapes import Objects, frame_matrix
 
 
-def studio(target: Chessboard, light: Light) -> Objects:
+def studio(target: AnyTarget, light: Light) -> Objects:
     """The lamp and the surrounding that give the board's white at its centre radiance 1."""
     corners = light.lamp_corners(target)
     edge_a, edge_b = (corners[1] - corners[0]) / 2.0, (corners[3] - corners[0]) / 2.0
@@ -27,7 +27,7 @@ def studio(target: Chessboard, light: Light) -> Objects:
     }
 
 
-def radiances(target: Chessboard, light: Light) -> tuple[float, float]:
+def radiances(target: AnyTarget, light: Light) -> tuple[float, float]:
     """Radiance of the lamp and of the surrounding that give the board's white at its centre radiance 1."""
     lamp, ambient = reference_irradiance(target, light)
     lamp_radiance = (1.0 - light.ambient_share) * np.pi / target.white / lamp

@@ -9,7 +9,7 @@ import numpy as np
 
 from eposit.arrays import Array
 from eposit.pose import rotation_from_vector
-from render.targets.chessboard import Chessboard
+from render.targets.kinds import AnyTarget
 from render.world.boards import other_board
 from render.world.materials import material_of
 from render.world.shapes import FRONT, RIGHT, UP, Objects, Shape, ball, box, pole
@@ -21,7 +21,7 @@ THIN_MM, THICK_MM = 8.0, 40.0  # radii of occluders
 FIELD_OF_THINGS_MM = 900.0  # they lie so far before and behind the target's plane
 
 
-def clutter(count: int, target: Chessboard, rng: np.random.Generator) -> Objects:
+def clutter(count: int, target: AnyTarget, rng: np.random.Generator) -> Objects:
     """Boxes, balls and rods of many materials, hanging around the target and never before it."""
     found: Objects = {}
     for i in range(count):
@@ -30,7 +30,7 @@ def clutter(count: int, target: Chessboard, rng: np.random.Generator) -> Objects
     return found
 
 
-def occluders(count: int, target: Chessboard, rng: np.random.Generator) -> Objects:
+def occluders(count: int, target: AnyTarget, rng: np.random.Generator) -> Objects:
     """Poles and balls before the target: each hides a part of it from most places."""
     x0, x1, y0, y1 = target.extent_mm
     found: Objects = {}
@@ -47,7 +47,7 @@ def occluders(count: int, target: Chessboard, rng: np.random.Generator) -> Objec
     return found
 
 
-def other_boards(count: int, target: Chessboard, rng: np.random.Generator) -> Objects:
+def other_boards(count: int, target: AnyTarget, rng: np.random.Generator) -> Objects:
     """Chessboards of other sizes beside the target, turned towards the camera more or less."""
     found: Objects = {}
     for i in range(count):
@@ -63,7 +63,7 @@ def other_boards(count: int, target: Chessboard, rng: np.random.Generator) -> Ob
     return found
 
 
-def _beside(target: Chessboard, rng: np.random.Generator) -> Array:
+def _beside(target: AnyTarget, rng: np.random.Generator) -> Array:
     """(3,) a place left of, right of, above or below the target, in a strip of SIDE_MM about its plane."""
     x0, x1, y0, y1 = target.extent_mm
     half = 0.5 * np.array([x1 - x0, y1 - y0]) + GAP_MM

@@ -10,7 +10,7 @@ import numpy as np
 
 from eposit.arrays import Array
 from render import backend
-from render.targets.chessboard import Chessboard
+from render.targets.kinds import AnyTarget
 from render.world.description import World
 from render.world.scene_file import SceneFileError, read_scene_file
 from render.world.shapes import Objects
@@ -50,7 +50,7 @@ def user_scene(path: Path, sha256: str) -> UserScene:
     return UserScene(objects, "<medium" in scene_file.text)
 
 
-def world_from_obj(world: World, target: Chessboard) -> Array:
+def world_from_obj(world: World, target: AnyTarget) -> Array:
     """(4, 4) from the object frame, mm, to the scene's frame and units."""
     back, up = -np.array(world.facing), np.array(world.up)
     z = back / np.linalg.norm(back)

@@ -4,7 +4,19 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from pipelines.statistics import Interval, bootstrap, mean, median, percent, percentile95, rate, wilson
+from pipelines.statistics import (
+    LEAST_FOR_TAIL,
+    Interval,
+    bootstrap,
+    mean,
+    median,
+    percent,
+    percentile95,
+    rate,
+    student,
+    tail,
+    wilson,
+)
 
 
 def test_the_interval_of_a_mean_is_that_of_the_normal_distribution():
@@ -70,3 +82,33 @@ def test_a_rate_is_known_even_where_nothing_happened():
     found = rate(seldom)
     assert found.low < found.value == 0.025 < found.high
     assert percent(found).startswith("2.5 [")
+
+
+def test_students_interval_of_a_mean():
+    # Of 1, 2, 3, 4: t(0.975, 3) = 3.18245, standard error sqrt(5/3)/2 = 0.645497.
+    found = student(np.array([1.0, 2.0, np.nan, 3.0, 4.0]))
+    assert (found.value, found.high) == pytest.approx((2.5, 2.5 + 3.182446 * 0.645497), rel=1e-6)
+    assert found.low == pytest.approx(5.0 - found.high)
+    assert student(np.array([3.0])) == Interval(3.0, -np.inf, np.inf)
+    assert np.isnan(student(np.zeros(0)).value)
+
+
+@pytest.mark.parametrize("n", [LEAST_FOR_TAIL, 200])
+def test_ninety_five_of_a_hundred_intervals_of_a_95th_percentile_hold_the_truth(n):
+    rng, truth = np.random.default_rng(4), norm.ppf(0.95)
+    drawn = [tail(rng.standard_normal(n)) for _ in range(600)]
+    held = np.mean([found.low <= truth <= found.high for found in drawn])
+    # At least 95 %, by construction; standard error over 600: 0.9 %.
+    assert held > 0.95 - 2.5 * 0.009
+    assert all(found.low <= found.value <= found.high for found in drawn)
+
+
+def test_a_95th_percentile_needs_enough_units_and_values_of_one_do_not_count():
+    values = np.random.default_rng(5).standard_normal((LEAST_FOR_TAIL, 1))
+    assert tail(values[1:]) is None
+    assert tail(np.repeat(values[1:], 5, axis=1)) is None
+    once, often = tail(values), tail(np.repeat(values, 5, axis=1))
+    assert (once.low, once.high) == (often.low, often.high)
+    lost = values.copy()
+    lost[3] = np.nan
+    assert tail(lost) is None

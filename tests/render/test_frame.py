@@ -163,7 +163,7 @@ def test_png_round_trip_and_refusal():
     image = np.random.default_rng(0).integers(0, 256, (20, 30)).astype(np.uint8)
     np.testing.assert_array_equal(decode_png(encode_png(image)), image)
     for data in (b"", b"not a picture"):
-        with pytest.raises(ValueError, match="not an 8-bit grey PNG"):
+        with pytest.raises(ValueError, match="not an 8-bit PNG, grey or in colour"):
             decode_png(data)
 
 

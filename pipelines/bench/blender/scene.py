@@ -27,7 +27,7 @@ def description(recipe: Recipe, frame: Frame, samples: int, threads: int) -> dic
     Raises:
         ValueError: the camera's lens is not the one that Cycles has.
     """
-    target, camera = recipe.target, frame.camera.true_camera()
+    target, camera = recipe.chessboard(), frame.camera.true_camera()
     lamp, surrounding = radiances(target, recipe.light)
     return {
         "board": _board(target),

@@ -22,15 +22,23 @@ def judge(found: Judgement, waived: Waived) -> Outcome:
     worse, unproved, better = (found.of(v) for v in (Verdict.WORSE, Verdict.UNPROVED, Verdict.BETTER))
     if worse:
         return failed(GATE, worse, waived)
-    if found.only_old:
-        told = f"not read tonight, though the baseline has them: {', '.join(found.only_old)}"
-        return Outcome(GATE, State.WARNED, told, findings=tuple(unproved))
+    if found.only_old or found.only_new:
+        return Outcome(GATE, State.WARNED, _of_one_side(found), findings=tuple(unproved))
     if unproved:
         told = f"{len(unproved)} of {len(found.findings)} metrics are neither shown to be worse nor to be equal"
         return Outcome(GATE, State.WARNED, told, findings=tuple(unproved))
     if better:
         return Outcome(GATE, State.CHANGED, describe(better), findings=tuple(better))
     return Outcome(GATE, State.PASSED, f"all {len(found.findings)} metrics are equal within their margins")
+
+
+def _of_one_side(found: Judgement) -> str:
+    told: list[str] = []
+    if found.only_old:
+        told.append(f"not read tonight, though the baseline has them: {', '.join(found.only_old)}")
+    if found.only_new:
+        told.append(f"not judged until a run with them is accepted: {', '.join(found.only_new)}")
+    return "; ".join(told)
 
 
 def failed(gate: str, worse: list[Finding], waived: Waived) -> Outcome:

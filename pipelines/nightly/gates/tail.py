@@ -27,7 +27,12 @@ PERCENT = 95.0
 
 def judge(old: pa.Table, new: pa.Table, waived: Waived) -> Outcome:
     """Compare two tables of measures of the same frames. A heavier tail fails unless it is waived."""
-    pooled = _exceedances(slices(old), slices(new))
+    return judge_slices(slices(old), slices(new), waived)
+
+
+def judge_slices(old: list[Slice], new: list[Slice], waived: Waived) -> Outcome:
+    """The same for the slices of two tables."""
+    pooled = _exceedances(old, new)
     if not pooled:
         return Outcome(GATE, State.NOT_RUN, f"no system has {LEAST_FRAMES} frames, fewer than tails need")
     p = np.array([_p_value(before, after) for before, after in pooled.values()])

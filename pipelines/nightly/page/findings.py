@@ -13,6 +13,8 @@ from pipelines.nightly.comparison import holm
 from pipelines.nightly.gates import fresh
 from pipelines.nightly.metrics import METRICS
 from pipelines.nightly.suites import CONFIRMING, FRESH
+from pipelines.pages.numbers import rounded, sensible, with_interval
+from pipelines.statistics import Interval
 
 # A change on fresh views that a second look on others did not confirm, as happens by chance on a few nights.
 UNCONFIRMED = "unconfirmed"
@@ -75,9 +77,7 @@ class Row:
     @property
     def change(self) -> str:
         """The effect with its 95 % interval, to the digits that the interval supports, two of the effect at most."""
-        effect, low, high = (self._shown(value) for value in (self.effect, self.low, self.high))
-        step = max(high - low, abs(effect) / 10.0)
-        return f"{rounded(effect, step, True)} [{rounded(low, step, True)}, {rounded(high, step, True)}]"
+        return with_interval(Interval(*(self._shown(value) for value in (self.effect, self.low, self.high))), True)
 
     @property
     def margin_text(self) -> str:
@@ -131,24 +131,6 @@ def by_slice(rows: list[Row]) -> dict[str, list[Row]]:
     for row in rows:
         found[row.key.slice].append(row)
     return dict(found)
-
-
-def sensible(value: float) -> str:
-    """To two significant digits, without zeros at their end; a dash for none."""
-    if not np.isfinite(value):
-        return "\N{EN DASH}"
-    return f"{value:.0f}" if 100.0 <= abs(value) < 1e6 else f"{value:.2g}"
-
-
-def rounded(value: float, step: float, signed: bool = False) -> str:
-    """To the first digit of `step`, to the second if the first is a 1, so that no digit is shown that means nothing."""
-    if not np.isfinite(value):
-        return "\N{EN DASH}"
-    if abs(value) >= 1e6 or 0.0 < abs(value) < 1e-6:
-        return f"{value:{'+' if signed else ''}.1e}"
-    known = np.isfinite(step) and step > 0.0
-    text = f"{value:+.{int(np.clip(np.ceil(-np.log10(step / 2.0)), 0, 9)) if known else 0}f}"
-    return text[1:] if float(text) == 0.0 or (text[0] == "+" and not signed) else text
 
 
 def _row(item: dict[str, Any]) -> Row:

@@ -1,33 +1,36 @@
-"""Frames to look at, from the datasets in which the baseline and the candidate read them."""
+"""Frames that a night shows: what the baseline and the candidate found in one picture, and pictures that changed."""
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from datasets.rows import decode_image, of_detector, points_by_frame
 from datasets.store.dataset import Dataset
-from eposit.arrays import Array
 from pipelines.detection import Detector
-from pipelines.nightly.page.pictures import Marks, Picture
-
-REGION = tuple(f"region_{name}_px" for name in ("x", "y", "width", "height"))
+from pipelines.nightly.gates.regenerate import Again
+from pipelines.pages.frames import crops, marks_by_frame
+from pipelines.pages.numbers import sensible
+from pipelines.pages.pictures import Picture, Side
 
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
     """A frame of both datasets, and what the page says of it."""
 
-    suite: str
-    slice: str
+    place: str  # suite and slice
     frame_id: int
     reason: str
     command: str  # that makes the frame again and shows it
+
+
+def frame_command(suite: str, frame_id: int, run_id: str, root: Path) -> str:
+    """What to type to make a frame of a run in a history's folder again. suite: with its regime."""
+    kept = f"--run {run_id} --history {shlex.quote(str(root))}"
+    return f"python -m pipelines nightly frame {suite} {frame_id} {kept} --out frame.png"
 
 
 def pictures_of(
@@ -41,35 +44,42 @@ def pictures_of(
         UserError: a shard is damaged.
         KeyError: a dataset lacks a frame.
     """
-    truth = points_by_frame(new.read("keypoints"), new.recipe.target)
-    sides = [points_by_frame(of_detector(side.read("detections"), detector), side.recipe.target) for side in (old, new)]
-    crops = _crops(new, {item.frame_id for item in wanted})
+    before, after = (marks_by_frame(side, detector) for side in (old, new))
+    shown = crops(new, {item.frame_id for item in wanted})
     found: list[Picture] = []
     for item in wanted:
-        crop, corner = crops[item.frame_id]
-        marks = [_marks(points[item.frame_id], truth[item.frame_id]) for points in sides]
-        named = (item.suite, item.slice, item.frame_id, item.reason, item.command)
-        found.append(Picture(*named, crop, corner, marks[0], marks[1]))
+        crop = shown[item.frame_id]
+        sides = (
+            Side("baseline", before[item.frame_id], crop.image),
+            Side("candidate", after[item.frame_id]),
+        )
+        found.append(Picture(item.frame_id, item.place, item.reason, item.command, crop.corner, sides))
     return found
 
 
-def _marks(points: Array, true: Array) -> Marks:
-    return Marks(points, points - true)
+def rendered_otherwise(again: Sequence[Again], run_id: str, root: Path) -> list[Picture]:
+    """Frames that come out otherwise when they are rendered again, the most different first."""
+    other = [item for item in again if item.differs]
+    other.sort(key=lambda item: (-item.grey_levels, -item.points_px, item.suite, item.frame_id))
+    return [_otherwise(item, run_id, root) for item in other]
 
 
-def _crops(dataset: Dataset, wanted: set[int]) -> dict[int, tuple[NDArray[np.uint8], tuple[int, int]]]:
-    """frame_id to its rendered region, and where that begins."""
-    found: dict[int, tuple[NDArray[np.uint8], tuple[int, int]]] = {}
-    for path in dataset.shards("frames"):
-        if wanted.isdisjoint(dataset.read_shard(path, ["frame_id"])["frame_id"].to_pylist()):
-            continue
-        rows = dataset.read_shard(path, ["frame_id", "image", *REGION])
-        own = [i for i, frame_id in enumerate(rows["frame_id"].to_pylist()) if frame_id in wanted]
-        found |= {row["frame_id"]: _crop(row, path) for row in rows.take(own).to_pylist()}
-    return found
-
-
-def _crop(row: dict[str, Any], path: Path) -> tuple[NDArray[np.uint8], tuple[int, int]]:
-    image = decode_image(row["image"], path, row["frame_id"])
-    x, y, width, height = (row[name] for name in REGION)
-    return image[y : y + height, x : x + width], (x, y)
+def _otherwise(item: Again, run_id: str, root: Path) -> Picture:
+    stored, rendered = (image[item.region.pixels] for image in (item.stored, item.rendered))
+    difference = np.abs(stored.astype(np.int64) - rendered)
+    levels = max(item.grey_levels, 1)
+    share = 100.0 * float(np.mean(difference > 0))
+    told = (
+        f"differs by {item.grey_levels} grey level{'s' if item.grey_levels != 1 else ''} at most, in "
+        f"{sensible(share)} % of the pixels; true points "
+        + ("are the same" if item.points_px == 0.0 else f"by {sensible(item.points_px)} px")
+    )
+    sides = (
+        Side("stored", image=stored),
+        Side("rendered tonight", image=rendered),
+        Side("difference", image=(difference * (255 // levels)).astype(np.uint8), told=f"white: {levels} or more"),
+    )
+    corner = item.region.x, item.region.y
+    return Picture(
+        item.frame_id, item.suite, told, frame_command(item.suite, item.frame_id, run_id, root), corner, sides
+    )

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import base64
-import hashlib
 import shlex
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -17,13 +16,13 @@ from pipelines.nightly.gates import accuracy, fresh
 from pipelines.nightly.history import LATEST, History
 from pipelines.nightly.page import plots
 from pipelines.nightly.page.findings import CHANGED, ORDER, Row, by_slice, most_changed, tonight
-from pipelines.nightly.page.pictures import Picture, drawn
 from pipelines.nightly.page.series import Nights, headlines
 from pipelines.nightly.record import Exit
 from pipelines.nightly.suites import CONFIRMING, FRESH, PINNED
-from pipelines.report.template import rendered
+from pipelines.pages.pictures import Picture, drawn
+from pipelines.pages.template import rendered
 
-FOLDER = Path(__file__).parent
+TEMPLATE = Path(__file__).with_name("page.html")
 MOST_NIGHTS = 365
 MOST_PICTURES = 12
 LEAST_ROOM = 60  # nights that the strip has room for, so that a few do not become wide bars
@@ -37,10 +36,19 @@ WORDS = {
     Exit.NO_VERDICT: "no verdict",
     Exit.COULD_NOT_RUN: "could not run",
 }
+TONES = {Exit.FINE: "good", Exit.NO_VERDICT: "warn"}
 
 
-def write_page(history: History, run_id: str | None, out: Path, pictures: Sequence[Picture] = ()) -> None:
-    """Write the page of a run, of the newest if `run_id` is None. pictures: the worst first; a dozen are shown.
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """Pictures of a night, the worst first; a dozen of each kind are shown."""
+
+    worst: Sequence[Picture] = ()  # what both sides found in one picture
+    otherwise: Sequence[Picture] = ()  # pictures that come out otherwise than they are stored
+
+
+def write_page(history: History, run_id: str | None, out: Path, shown: Shown | None = None) -> None:
+    """Write the page of a run, of the newest if `run_id` is None.
 
     The nights up to this run are shown with it, a year at most.
 
@@ -50,33 +58,20 @@ def write_page(history: History, run_id: str | None, out: Path, pictures: Sequen
     chosen = history.name_of(run_id or LATEST)
     ids = history.run_ids()
     end = ids.index(chosen) + 1
-    shown = ids[max(0, end - MOST_NIGHTS) : end]
-    runs = history.runs().to_pylist()[end - len(shown) : end]
-    findings = history.findings(shown)
+    pictures = shown or Shown()
+    named = ids[max(0, end - MOST_NIGHTS) : end]
+    runs = history.runs().to_pylist()[end - len(named) : end]
     rows = tonight(history.findings([chosen]))
-    nights = Nights(findings, shown)
-    style, script = ((FOLDER / name).read_text(encoding="utf-8") for name in ("page.css", "page.js"))
+    nights = Nights(history.findings(named), named)
     html = rendered(
-        FOLDER / "page.html",
-        style=style,
-        script=script,
-        policy=_policy(style, script),
+        TEMPLATE,
         **_of_night(runs),
         **_of_findings(rows, nights, runs),
         **_commands(rows, chosen, history.root),
-        pictures=[drawn(picture) for picture in pictures[:MOST_PICTURES]],
+        worst=[drawn(picture) for picture in pictures.worst[:MOST_PICTURES]],
+        otherwise=[drawn(picture) for picture in pictures.otherwise[:MOST_PICTURES]],
     )
     write_text(out, html)
-
-
-def _policy(style: str, script: str) -> str:
-    """Content security policy: nothing is loaded, and only this page's own style and script are used."""
-    digests = (hashlib.sha256(text.encode()).digest() for text in (style, script))
-    of_style, of_script = (f"'sha256-{base64.b64encode(digest).decode()}'" for digest in digests)
-    return (
-        f"default-src 'none'; style-src {of_style}; script-src {of_script}; img-src data:; "
-        "base-uri 'none'; form-action 'none'"
-    )
 
 
 def _of_night(runs: list[dict[str, Any]]) -> dict[str, Any]:
@@ -87,6 +82,7 @@ def _of_night(runs: list[dict[str, Any]]) -> dict[str, Any]:
     return {
         "run": run,
         "word": _word(run["exit"]),
+        "tone": TONES.get(run["exit"], "bad"),
         "runs": runs,
         "room": max(LEAST_ROOM, len(runs)),
         "words": [_word(item["exit"]) for item in runs],
@@ -113,6 +109,9 @@ def _of_findings(rows: list[Row], nights: Nights, runs: list[dict[str, Any]]) ->
         "compared": len(rows),
         "moved": [(runs[i]["started"], runs[i]["baseline"]) for i in moved],
         "trends": [_trend(row, nights, moved) for row in headlines(rows, changes)],
+        "kinds": [(name, name) for name in ORDER if counts[name]],
+        "changed": CHANGED,
+        "places": {name: f"slice-{i}" for i, name in enumerate(by_slice(rows), start=1)},
         "slices": [(name, own, plots.spark(nights.of(own[0].key))) for name, own in by_slice(rows).items()],
     }
 

@@ -10,11 +10,11 @@ from matplotlib.colors import LogNorm
 
 from eposit import LENS_NAMES, Pose, Solution
 from eposit.arrays import Array
+from pipelines.pages.sections import Drawing, Table
+from pipelines.pages.svg import STYLE, svg
 from pipelines.paper.beyond.field import solve_by
 from pipelines.paper.claims import PaperSection, Statement, Verdict
 from pipelines.paper.problems import OBJECT, bounds, camera_with, errors_of, fisheye_with, helix, information, turned
-from pipelines.report.sections import Drawing, Table
-from pipelines.report.svg import STYLE, svg
 
 LENSES = tuple(name for name in LENS_NAMES if name != "kannala_brandt")
 SOLVERS = {"best": "Default solver", "eposit": "EPOSIT"}

@@ -7,9 +7,9 @@ from scipy.stats import chi2
 
 import eposit
 from eposit.arrays import Array
+from pipelines.pages.sections import Table
 from pipelines.paper.claims import PaperSection
 from pipelines.paper.problems import SIGMA_PX, camera_with, cloud, errors_of, helix, information, noisy
-from pipelines.report.sections import Table
 from pipelines.statistics import percent, wilson
 
 CHI_SQUARE_95 = float(chi2.ppf(0.95, 6))  # for six degrees of freedom

@@ -7,6 +7,8 @@ import numpy as np
 
 import eposit
 from eposit.arrays import Array
+from pipelines.pages.sections import Drawing, Table
+from pipelines.pages.svg import STYLE, svg
 from pipelines.paper.claims import PaperSection, Statement, holds_if
 from pipelines.paper.problems import (
     NORMAL_MEDIAN,
@@ -21,8 +23,6 @@ from pipelines.paper.problems import (
     noisy,
     repeated,
 )
-from pipelines.report.sections import Drawing, Table
-from pipelines.report.svg import STYLE, svg
 from pipelines.statistics import Interval, bootstrap, median
 
 COMPONENTS = ("rotation x", "rotation y", "rotation z", "x", "y", "z")

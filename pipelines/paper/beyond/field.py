@@ -12,10 +12,10 @@ import eposit
 from eposit import Camera, Pose, Solution
 from eposit.arrays import Array, Mask
 from pipelines.adapters.registry import find_solver
+from pipelines.pages.sections import Drawing, Table
+from pipelines.pages.svg import STYLE, svg
 from pipelines.paper.claims import PaperSection
 from pipelines.paper.problems import EXACT_RAD, OBJECT, SIGMA_PX, at_field_angle, bounds, errors_of, information, noisy
-from pipelines.report.sections import Drawing, Table
-from pipelines.report.svg import STYLE, svg
 from pipelines.statistics import Interval, percent, wilson
 
 ANGLES = tuple(range(0, 111, 5))

@@ -17,9 +17,9 @@ from eposit import Camera, Pose
 from eposit.arrays import Array
 from eposit.pose import rotation_error_rad
 from pipelines.detection import Detector
+from pipelines.pages.sections import Drawing, Table
 from pipelines.paper.beyond.field import LIMIT_DEG, SOLVERS, curves, solve_by
 from pipelines.paper.claims import PaperSection
-from pipelines.report.sections import Drawing, Table
 from pipelines.stages.detect import path_of
 from pipelines.statistics import Interval, percent, wilson
 

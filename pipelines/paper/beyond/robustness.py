@@ -9,10 +9,10 @@ import eposit
 from eposit import Pose
 from eposit.arrays import Array, Mask
 from eposit.pose import rotation_from_vector
+from pipelines.pages.sections import Table
 from pipelines.paper.beyond.efficiency import CAMERAS
 from pipelines.paper.claims import PaperSection
 from pipelines.paper.problems import SIGMA_PX, bounds, camera_with, errors_of, information, noisy
-from pipelines.report.sections import Table
 from pipelines.statistics import percent, wilson
 from render.targets.chessboard import Chessboard
 

@@ -9,9 +9,9 @@ from eposit.arrays import Array, Mask
 from eposit.pose import rotation_error_rad
 from eposit.posit.iteration import posit
 from eposit.posit.orthography import Orthography
+from pipelines.pages.sections import Table
 from pipelines.paper.claims import PaperSection, Statement, Verdict, holds_if
 from pipelines.paper.problems import EXACT_RAD, OBJECT, SIDE_MM, at_angles, helix, turned
-from pipelines.report.sections import Table
 from pipelines.statistics import percent, wilson
 
 LIMIT_DEG = 40.0  # all points of a random problem lie inside: EPOSIT's own limit is 54.7

@@ -18,6 +18,7 @@ from eposit.arrays import Array
 from pipelines.detection import Detector
 from pipelines.engines.local import LocalEngine
 from pipelines.machine import provenance
+from pipelines.pages.sections import Drawing, Table
 from pipelines.paper.claims import PaperSection, judged
 from pipelines.paper.experiment import figures
 from pipelines.paper.experiment.calibration import AT_ONCE
@@ -34,7 +35,6 @@ from pipelines.paper.experiment.pictures import (
     read_pictures,
 )
 from pipelines.paper.experiment.times import Cost, timed
-from pipelines.report.sections import Drawing, Table
 
 RECIPE = "experiment"
 DETECTORS = (Detector.OPENCV_SUBPIX, Detector.EDGE_FIT)  # the first as in the paper

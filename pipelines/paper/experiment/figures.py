@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 
 from eposit.arrays import Array
 from eposit.pose import euler_from_rotation
+from pipelines.pages.svg import STYLE, svg
 from pipelines.paper.experiment.pictures import HARD, MethodResult, Pictures
-from pipelines.report.svg import STYLE, svg
 
 MARKS = ("o", "x", "+", "s")
 LIMIT_RAD, LIMITS_MM = 0.2, (50.0, 50.0, 200.0)  # the paper's

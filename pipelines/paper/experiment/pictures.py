@@ -71,7 +71,7 @@ def read_pictures(dataset: Dataset, detector: str) -> Pictures:
     """The pictures of a finished dataset with the points of one detector."""
     frames = dataset.read("frames", [name for name in FRAMES.names if name != "image"])
     rows = of_detector(dataset.read("detections"), detector)
-    target, first = dataset.recipe.target, frames.slice(0, 1).to_pylist()[0]
+    target, first = dataset.recipe.chessboard(), frames.slice(0, 1).to_pylist()[0]
     points, sigmas = points_by_frame(rows, target), covariances_by_frame(rows, target)
     ids = frames["frame_id"].to_pylist()
     n, each = len(target.points), rows["status"].to_pylist()

@@ -8,10 +8,10 @@ from functools import partial
 import numpy as np
 
 from eposit.arrays import Array
+from pipelines.pages.sections import Drawing, Table
 from pipelines.paper import simulation as sim
 from pipelines.paper.problems import NORMAL_MEDIAN, OBJECT, bounds, information
 from pipelines.paper.simulation.plots import boxes
-from pipelines.report.sections import Drawing, Table
 from pipelines.statistics import FEW, bootstrap, median, percent, percentile95, rate
 
 OPNP_DRAWS = 5  # for OPnP, of which a pose takes milliseconds

@@ -6,8 +6,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from eposit.arrays import Array
+from pipelines.pages.svg import STYLE, svg
 from pipelines.paper.simulation import COMPONENTS, UNITS
-from pipelines.report.svg import STYLE, svg
 
 
 def curves(time: Array, truth: Array, series: dict[str, Array]) -> str:

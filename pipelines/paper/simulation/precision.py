@@ -9,6 +9,7 @@ import numpy as np
 
 from eposit.arrays import Array
 from eposit.pose import euler_from_rotation
+from pipelines.pages.sections import Drawing, Table
 from pipelines.paper import simulation as sim
 from pipelines.paper.claims import (
     EQUATIONS,
@@ -23,7 +24,6 @@ from pipelines.paper.claims import (
 from pipelines.paper.problems import helix
 from pipelines.paper.simulation import DEPTH, PLACE, ROTATION, mean_over_draws
 from pipelines.paper.simulation.plots import boxes, curves
-from pipelines.report.sections import Drawing, Table
 
 METHODS = {EQUATIONS: sim.equations_from_principal_point, RELEASED: sim.as_released_from_principal_point}
 INTRO = (

@@ -8,6 +8,7 @@ import numpy as np
 
 import eposit
 from eposit.arrays import Array
+from pipelines.pages.sections import Drawing, Table
 from pipelines.paper import simulation as sim
 from pipelines.paper.claims import (
     EQUATIONS,
@@ -24,7 +25,6 @@ from pipelines.paper.problems import OBJECT, helix
 from pipelines.paper.simulation import DEPTH, PLACE, ROTATION, mean_over_draws
 from pipelines.paper.simulation.plots import boxes
 from pipelines.paper.simulation.precision import METHODS
-from pipelines.report.sections import Drawing, Table
 
 FROM_CENTRE = {EQUATIONS: sim.equations, RELEASED: sim.as_released}
 PINHOLE = ("perspective",)

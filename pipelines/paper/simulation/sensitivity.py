@@ -10,10 +10,10 @@ import eposit
 from datasets.trajectories.helix import Helix
 from eposit import Pose, Solution, released
 from eposit.arrays import Array
+from pipelines.pages.sections import Table
 from pipelines.paper import simulation as sim
 from pipelines.paper.claims import PaperSection
 from pipelines.paper.problems import OBJECT, poses_on
-from pipelines.report.sections import Table
 from pipelines.statistics import bootstrap, mean
 
 LENSES = ("perspective", "equidistance", "orthogonal")

@@ -132,8 +132,8 @@ FILES = {
     "truncated master": (damaged("masters", half, "verify"), "cannot be read as a linear image"),
     "garbage master": (damaged("masters", garbage, "verify"), "cannot be read as a linear image"),
     "missing master": (damaged("masters", gone, "verify"), "is missing; run the generate stage"),
-    "image is no PNG": (not_a_png("detect"), "the image is not an 8-bit grey PNG"),
-    "image is no PNG, verify": (not_a_png("verify"), "the image is not an 8-bit grey PNG"),
+    "image is no PNG": (not_a_png("detect"), "the image is not an 8-bit PNG, grey or in colour"),
+    "image is no PNG, verify": (not_a_png("verify"), "the image is not an 8-bit PNG, grey or in colour"),
 }
 
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pyarrow as pa
 
+from pipelines.nightly import metrics
 from pipelines.nightly.measures import SCHEMA
 from pipelines.nightly.metrics import METRICS
 
 CAMERAS = ("perspective", "stereographic", "equidistance", "equisolid", "orthogonal")
 DETECTOR, SOLVER = "edge-fit", "best detected exact all"
 CORNERS = 54
+MEASURED = [metric.name for metric in (*metrics.CORNERS, *metrics.POSES)]  # of the detector and of our solver
 
 # Standard deviation over the poses of a frame's value, from 400 frames.
 CORNER_SCATTER_PX, CIRCLE_SCATTER_PX, LOG_LENGTH_SCATTER = 0.0007, 0.010, 0.8
@@ -58,7 +60,7 @@ def stated_covariance(factor):
     def plant(values):
         values["corner_nees"] /= factor
         values["pose_nees"] /= factor
-        for name in METRICS:
+        for name in MEASURED:
             if name.endswith("_normalised"):
                 values[name] /= np.sqrt(factor)
 
@@ -66,21 +68,21 @@ def stated_covariance(factor):
 
 
 def _camera(camera, poses, rng, fault):
-    values = {name: rng.normal(0.0, 1.0, poses) for name in METRICS}
+    values = {name: rng.normal(0.0, 1.0, poses) for name in MEASURED}
     for name in ("corner_x", "corner_y", "corner_radial"):
         values[name] *= CORNER_SCATTER_PX
     for name in ("circle_x", "circle_y"):
         values[name] *= CIRCLE_SCATTER_PX
     values["corner_log_ms"] = -10.67 + np.log(rng.chisquare(2 * CORNERS, poses) / (2 * CORNERS)) + 0.3 * _bias(poses)
     values["corner_nees"] = 1.0 + NEES_SCATTER * values["corner_nees"]
-    components = np.stack([values[name] for name in METRICS if name.endswith("_normalised")])
+    components = np.stack([values[name] for name in MEASURED if name.endswith("_normalised")])
     values["pose_nees"] = np.mean(components**2, axis=0)
     for name in ("pose_log_t", "pose_log_R"):
         values[name] = -4.0 + LOG_LENGTH_SCATTER * values[name]
     if fault is not None:
         fault(values)
-    of_points = [name for name in METRICS if name.startswith(("corner", "circle"))]
-    of_poses = [name for name in METRICS if name not in of_points]
+    of_points = [name for name in MEASURED if name.startswith(("corner", "circle"))]
+    of_poses = [name for name in MEASURED if name not in of_points]
     both = ((DETECTOR, of_points), (SOLVER, of_poses))
     return pa.concat_tables([_rows(camera, system, values, poses, held) for system, held in both])
 

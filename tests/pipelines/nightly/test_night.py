@@ -122,7 +122,7 @@ def test_corners_that_are_off_by_two_thousandths_of_a_pixel_are_worse(night, mon
 def _shows_the_worst_frames(nights, row, cli):
     """All twelve of both suites, with both sides' corners; the command beside one makes the same picture."""
     page = (nights / "report.html").read_text()
-    commands = re.findall(r"Make it again: <code>python -m pipelines (.+?)</code>", page)
+    commands = re.findall(r'Make it again: <code class="command">python -m pipelines (.+?)</code>', page)
     assert len(commands) == 12
     assert page.count("<b>baseline</b> 55 of 55 points") == page.count("<b>candidate</b> 55 of 55 points") == 12
     for suite in ("pinned", "fresh"):

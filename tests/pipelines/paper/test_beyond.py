@@ -5,6 +5,7 @@ import pytest
 from scipy.stats import chi2
 
 from datasets.errors import UserError
+from pipelines.pages.sections import Drawing, Table
 from pipelines.paper.beyond import efficiency, robustness
 from pipelines.paper.beyond.assumed_lens import LENSES, assumed_lens
 from pipelines.paper.beyond.coverage import CHI_SQUARE_95, coverage, squared_errors
@@ -23,7 +24,6 @@ from pipelines.paper.problems import (
     information,
     turned,
 )
-from pipelines.report.sections import Drawing, Table
 from tests.cameras import helix_pose
 
 

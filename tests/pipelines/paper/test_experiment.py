@@ -10,10 +10,10 @@ from datasets.plan import plan
 from datasets.recipe.model import load_recipe, parse_recipe, values
 from eposit import Pose
 from eposit.pose import tilt_rad
+from pipelines.pages.sections import Drawing, Table
 from pipelines.paper.experiment import compare, section
 from pipelines.paper.experiment.pictures import HARD, Pictures, by_eposit, estimated
 from pipelines.paper.experiment.times import Cost
-from pipelines.report.sections import Drawing, Table
 from pipelines.statistics import Interval
 from tests.datasets.trajectories.test_trajectories import BASE
 

@@ -14,6 +14,7 @@ from pipelines.paper.simulation.fisheye import fisheye
 from pipelines.paper.simulation.precision import METHODS, precision
 from pipelines.paper.simulation.principal_point import principal_point
 from pipelines.paper.simulation.sensitivity import sensitivity
+from tests.pipelines.pages.parsed import Page
 
 
 def test_noise_is_shared_by_the_lenses_and_differs_between_draws():
@@ -75,7 +76,12 @@ def test_every_part_on_points_has_claims_with_figures():
 def test_the_files_are_written_and_the_table_keeps_its_columns(tmp_path, capsys):
     page, claims = reproduce(tmp_path / "paper", ["principal-point"], 1, True, 1)
     html = page.read_text()
-    assert html.count("<svg") == 1
+    page_of_paper = Page(html)
+    assert len(page_of_paper.of("svg")) == 1
+    assert re.fullmatch(r"Of 6 claims .*\.", page_of_paper.of("h1")[0].text)
+    claims_table, *tables = page_of_paper.of("table")
+    assert len(page_of_paper.inside(claims_table, "tbody")) == 6
+    assert all(page_of_paper.inside(table, "caption") for table in tables)
     assert "Stability to the principal point" in html
     rows = [line for line in claims.read_text().splitlines() if line.startswith("|")]
     assert len({len(re.findall(r"(?<!\\)\|", row)) for row in rows}) == 1

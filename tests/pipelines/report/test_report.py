@@ -1,27 +1,69 @@
 """The report: self-contained, and its tables are the scores."""
 
-import re
-
 import numpy as np
+import pytest
 
 from datasets.rows import of_detector
 from datasets.store.dataset import open_dataset
-from pipelines.report.data import ERRORS, Series, normalised_rows, score_rows, series
+from datasets.store.images import decode_png
+from pipelines.report.data import ERRORS, Series, cells, normalised_rows, series
 from pipelines.report.page import REPORT, write_report
 from pipelines.report.points import field_rows, point_errors, tilt_rows
+from tests.pipelines.pages.parsed import Page
 
 
 def test_report_is_one_file_without_the_network(tiny):
     _, root = tiny
     text = (root / REPORT).read_text()
-    assert "<script" not in text
-    # Addresses appear as names of XML vocabularies only; nothing is loaded from one.
-    assert not re.findall(r'(?:src|href)="(?!data:|#)[^"]*"', text)
-    for part in ("Pictures", "Detection", "Poses", "What was run", "data:image/png;base64,", "best detected exact all"):
-        assert part in text
+    page = Page(text)
+    addresses = [item.attributes[name] for item in page.all for name in ("href", "src") if name in item.attributes]
+    assert all(address.startswith(("#", "data:image/jpeg;base64,")) for address in addresses)
+    assert not [item for item in page.all if any(name.startswith("on") or name == "style" for name in item.attributes)]
+    titles = [item.text for item in page.of("h2")]
+    assert titles == [
+        "Summary", "One frame of each camera", "Frames to look at", "Detection", "Poses", "Errors frame by frame",
+        "What was run",
+    ]  # fmt: skip
     before = text
     write_report(open_dataset(root))
     assert (root / REPORT).read_text() == before  # equal data, equal bytes
+
+
+def test_everything_has_a_name_for_a_screen_reader(tiny):
+    _, root = tiny
+    page = Page((root / REPORT).read_text())
+    ids = [item.attributes["id"] for item in page.all if "id" in item.attributes]
+    assert len(ids) == len(set(ids))
+    assert all(item.attributes["aria-labelledby"] in ids for item in page.of("section"))
+    assert [len(page.of(tag)) for tag in ("header", "main", "footer", "h1")] == [1, 1, 1, 1]
+    for item in page.of("svg"):
+        hidden = item.attributes.get("aria-hidden") == "true"
+        assert hidden != (item.attributes.get("role") == "img" and bool(item.attributes.get("aria-label")))
+    captioned = [item.parents[-1] for item in page.of("caption")]
+    assert all(any(table is other for other in captioned) for table in page.of("table"))
+    assert all("scope" in item.attributes for item in page.of("th"))
+    for item in page.of("input") + page.of("select"):
+        assert any(parent.tag == "label" for parent in item.parents)
+
+
+def test_frames_are_shown_with_what_makes_them_again(tiny, cli, tmp_path):
+    _, root = tiny
+    page = Page((root / REPORT).read_text())
+    usual, worst = page.of("ul", "frames")
+    assert len(page.inside(usual, "li")) == 1  # one of each camera
+    assert len(page.inside(worst, "li")) == 2  # all, as there are two
+    command = page.inside(worst, "code", "command")[0].text
+    words = command.replace("DATASET", str(root)).split()
+    assert words[:4] == ["python", "-m", "pipelines", "frame"]
+    out = tmp_path / words[-1]
+    done = cli(*words[3:-1], out)
+    assert done.code == 0
+    told = page.inside(worst, "figcaption")[0].text
+    assert told.startswith("55 of 55 points, RMS 0.0")
+    assert "54 of 54 corners, mean error " in done.out
+    stored = {row["frame_id"]: row["image"]["bytes"] for row in open_dataset(root).read("frames").to_pylist()}
+    np.testing.assert_array_equal(decode_png(out.read_bytes()), decode_png(stored[int(words[5])]))
+    assert "has no frame 2; give a number from 0 to 1" in cli("frame", root, 2, "--out", out).err
 
 
 def test_failures_are_counted_and_kept_out_of_medians(tiny):
@@ -31,29 +73,42 @@ def test_failures_are_counted_and_kept_out_of_medians(tiny):
     frames = dataset.read("frames", ["frame_id", "camera_name", "tilt_deg"]).to_pylist()
     cameras = {frame["frame_id"]: frame["camera_name"] for frame in frames}
     found = series(scores)
-    rows = score_rows(found, cameras)
-    assert sum(row["n"] for row in rows) == scores.num_rows
+    rows = cells(found, cameras)
+    assert sum(row.n for row in rows) == scores.num_rows
     for item in found:
         assert np.isnan(item.errors["rotation_error_deg"][item.failed]).all()
         assert np.all(item.gross[item.failed])
     for row in rows:
-        for score in row["rotation_error_deg"] or ():
+        for score in (row.rotation_deg, row.position_mm, *(error.median for error in row.errors)):
             assert score.low <= score.value <= score.high
-        assert row["failed_rate"].value == row["failed"] / row["n"]
+        assert row.failed_rate.value == row.failed / row.n
     broken = found[0]
-    broken.failed[:] = True
-    assert all(row["rotation_error_deg"] is None for row in score_rows([broken], cameras))
-    assert sum(row["failed"] for row in score_rows([broken], cameras)) == len(broken.failed)
+    broken.status[:] = "not_converged"
+    for row in cells([broken], cameras):
+        assert (row.rotation_deg, row.position_mm, row.errors) == (None, None, ())
+        assert row.failed == row.n
+
+
+def _series(n, draws, values):
+    errors = {column: np.repeat(values, draws) for column in ERRORS}
+    frame = np.repeat(np.arange(n), draws)
+    status, never = np.full(len(frame), "ok"), np.zeros(len(frame), bool)
+    return Series("x", {}, frame, errors, np.full((len(frame), 6), np.nan), status, never)
 
 
 def test_draws_of_one_frame_stay_together_in_the_intervals():
-    errors = {column: np.repeat([1.0, 2.0, 3.0, 4.0], 25) for column in ERRORS}
-    frame, never = np.repeat([7, 8, 9, 10], 25), np.zeros(100, bool)
-    (row,) = score_rows(
-        [Series("x", frame, errors, np.full((100, 6), np.nan), never, never)], dict.fromkeys((7, 8, 9, 10), "a")
-    )
+    (row,) = cells([_series(4, 25, [1.0, 2.0, 3.0, 4.0])], dict.fromkeys(range(4), "a"))
     # Of four frames some samples lack the middle two; of a hundred values that would never happen.
-    assert (row["rx_error_deg"][0].low, row["rx_error_deg"][0].high) == (1.0, 4.0)
+    assert (row.rotation_deg.low, row.rotation_deg.high) == (1.0, 4.0)
+
+
+@pytest.mark.parametrize(("frames", "told"), [(71, False), (72, True)])
+def test_a_95th_percentile_is_told_from_72_frames(frames, told):
+    (row,) = cells([_series(frames, 3, np.arange(1.0, frames + 1.0))], dict.fromkeys(range(frames), "a"))
+    assert all((error.tail is not None) == told for error in row.errors)
+    assert [error.label for error in row.errors if error.mean is not None] == [
+        "rx, deg", "ry, deg", "rz, deg", "x, mm", "y, mm", "z, mm",
+    ]  # fmt: skip
 
 
 FRAME_COLUMNS = ["frame_id", "camera_name", "tilt_deg", "cx_px", "cy_px"]

@@ -91,9 +91,9 @@ def test_they_stand_in_the_report_beside_the_others(poses, root, tmp_path, cli, 
     assert cli(*words).code == 0
     assert cli("report", root).code == 0
     text = (root / REPORT).read_text()
-    assert "<td>theirs image nominal all</td>" in text
-    assert "<h2>theirs image nominal all</h2>" in text
-    assert "<td>best detected exact all</td>" in text
+    for setting in ("theirs image nominal all", "best detected exact all"):
+        assert f'<th scope="row" data-value="{setting}">' in text
+        assert f"<summary>{setting}</summary>" in text
     before, digest = files(root), content(root)
     assert cli(*words).code == 0
     kept = {path: found for path, found in before.items() if path.suffix == ".parquet"}

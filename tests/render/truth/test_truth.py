@@ -36,11 +36,6 @@ SIMILARITIES = {
 }
 
 
-def loaded(objects, matrix):
-    """Objects of the object frame in a scene whose frame is another one."""
-    return load_objects({name: thing | {"to_world": matrix @ thing["to_world"]} for name, thing in objects.items()})
-
-
 def rays():
     """(height, width, 3) unit bearings of pixel centres, NaN beyond the lens."""
     x, y = np.meshgrid(np.arange(CAMERA.width, dtype=float), np.arange(CAMERA.height, dtype=float))
@@ -50,8 +45,8 @@ def rays():
 @pytest.mark.parametrize("name", SIMILARITIES)
 def test_a_ball_has_the_closed_forms_depth_range_and_normal(name):
     centre, radius = np.array([400.0, 250.0, 100.0]), 320.0
-    truth = pixel_truth(loaded({"ball": ball(centre, radius, GREY)}, SIMILARITIES[name]), SIMILARITIES[name], ("ball",),
-                        CAMERA, POSE)  # fmt: skip
+    matrix = SIMILARITIES[name]
+    truth = pixel_truth(load_objects({"ball": ball(centre, radius, GREY)}, matrix), matrix, ("ball",), CAMERA, POSE)
     in_cam, bearing = POSE.apply(centre[None])[0], rays()
     along = bearing @ in_cam
     inside = radius**2 - (in_cam @ in_cam - along**2)
@@ -73,7 +68,7 @@ def test_a_ball_has_the_closed_forms_depth_range_and_normal(name):
 def test_the_board_is_a_plane_and_the_circle_lies_before_it(name):
     shapes = target_shapes(TARGET, lambda reflectance: surface("matt", 0.0, reflectance))
     matrix = SIMILARITIES[name]
-    truth = pixel_truth(loaded(shapes, matrix), matrix, tuple(shapes), CAMERA, POSE)
+    truth = pixel_truth(load_objects(shapes, matrix), matrix, tuple(shapes), CAMERA, POSE)
     normal, centre = -POSE.R[:, 2], POSE.inverse().t
     for number, z in ((1, 0.0), (2, -TARGET.circle_height_mm)):
         seen = truth.object_id == number

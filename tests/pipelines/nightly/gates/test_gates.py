@@ -1,19 +1,24 @@
 """Each gate by itself: every state that it can end in, and what it tells."""
 
+import contextlib
 import dataclasses
 
 import numpy as np
 import pyarrow as pa
 import pytest
 
+from pipelines.nightly.differences import other_code, other_machine
 from pipelines.nightly.gates import accuracy, data, failures, fresh, regenerate, replay, speed, tail
 from pipelines.nightly.judgement import Failures, judge
+from pipelines.nightly.other_code import ROOT, Code
 from pipelines.nightly.record import Exit, State, Timing
+from render.targets.image_region import Region
 from tests.pipelines.nightly import simulated
 
 POSES = 20
 SLICE = "typical/equisolid/edge-fit"
 BIAS = simulated.corner_bias(0.002)
+OTHER = "numpy is 2.4 instead of 2.3"
 
 
 def nobody(*_):
@@ -91,27 +96,61 @@ def test_data():
         (1, 0.0, True, State.FAILED),
         (0, 1e-12, True, State.FAILED),
         (1, 1e-10, False, State.CHANGED),
+        (0, 0.0, False, State.CHANGED),
         (2, 0.0, False, State.FAILED),
         (0, 1e-8, False, State.FAILED),
         (0, float("nan"), False, State.FAILED),
     ],
 )
 def test_regenerate(grey, points, same, state):
-    frames = [regenerate.Again("pinned-typical", 3, 0, 0.0), regenerate.Again("pinned-typical", 7, grey, points)]
-    found = regenerate.judge(frames, same)
+    stored = np.full((4, 6), 250, np.uint8)
+    other = stored.copy()
+    other[1, 2] += grey
+    region = Region(0, 0, 6, 4)
+    frames = [
+        regenerate.Again("pinned-typical", 3, stored, stored, region, 0.0),
+        regenerate.Again("pinned-typical", 7, stored, other, region, points),
+    ]
+    assert [item.differs for item in frames] == [False, bool(grey or points)]
+    found = regenerate.judge(frames, () if same else (OTHER,))
     assert found.state is state
     if state is State.FAILED:
         assert found.exit is Exit.NO_VERDICT
         assert found.frames == (("pinned-typical", 7),)
+    assert found.sentence.endswith(OTHER) is not same
 
 
-def test_replay_never_fails():
+def test_replay_never_fails_and_tells_how_far_and_why():
     old = {"typical truth": "a", "typical noisy": "b"}
-    assert replay.judge(old, old).state is State.PASSED
-    found = replay.judge(old, old | {"typical noisy": "c"})
-    assert found.state is State.CHANGED
-    assert "typical noisy" in found.sentence
-    assert replay.judge({}, old).state is State.NOT_RUN
+    assert replay.judge(old, old, 0.0, ()).state is State.PASSED
+    for reasons, told in (((OTHER,), OTHER), ((), "code, versions and machine are the baseline's")):
+        found = replay.judge(old, old | {"typical noisy": "c"}, 2e-9, reasons)
+        assert found.state is State.CHANGED
+        assert found.sentence.endswith(f"by at most 2e-09 of themselves; {told}")
+    assert replay.judge({}, old, 0.0, ()).state is State.NOT_RUN
+
+
+def test_replay_measures_poses_from_noisy_points_only():
+    """A system of that name has errors that are a quarter longer in one frame."""
+    old = simulated.night(POSES, np.random.default_rng(0))
+    assert np.isnan(replay.largest_change(old, old))
+    name, place = "pose_log_R", old.schema.get_field_index("pose_log_R")
+    systems = [text.replace("detected", "truth+0.4px") for text in old["system"].to_pylist()]
+    noisy = old.set_column(old.schema.get_field_index("system"), "system", pa.array(systems))
+    values = old[name].to_numpy(zero_copy_only=False).copy()
+    values[np.flatnonzero(np.isfinite(values))[3]] += np.log(1.25)
+    column = pa.array(values, mask=np.isnan(values))
+    assert replay.largest_change(noisy, noisy.set_column(place, name, column)) == pytest.approx(0.25)
+    assert np.isnan(replay.largest_change(old, old.set_column(place, name, column)))
+
+
+def test_differences_are_told_with_both_values():
+    assert other_machine({"numpy": "2.3", "blas": "a"}, {"numpy": "2.4", "blas": "a"}) == (
+        "numpy is 2.4 instead of 2.3",
+    )
+    assert other_machine({}, {"numpy": "2.4"}) == ("numpy is 2.4 instead of unknown",)
+    assert other_code("a", "a") == ()
+    assert other_code(None, "a") == ("the code is not the baseline's",)
 
 
 def _fresh(first, second, waived=nobody):
@@ -207,3 +246,23 @@ def test_speed_is_waived_only_if_every_slow_stage_is():
     slow = [Timing(stage, 1.2, 1.1, 1.3, 1.0, 1.2) for stage in ("detect", "estimate")]
     assert speed.judge(slow, lambda stage: stage == "detect").state is State.FAILED
     assert speed.judge(slow, everybody).state is State.WAIVED
+
+
+@pytest.mark.parametrize("scatter", [0.01, 0.3])
+def test_speed_takes_more_turns_where_times_scatter(scatter, monkeypatch):
+    """One turn scatters by 1 %, or by 30 %, far more than on a crowded machine: a quarter is told from nothing."""
+    rng, taken = np.random.default_rng(5), []
+
+    def turn(factor):
+        taken.append(factor)
+        return {stage: factor * rng.lognormal(0.0, scatter) for stage in ("detect", "estimate")}
+
+    for slower, state in ((1.0, State.PASSED), (1.25, State.FAILED)):
+        factors = iter((1.0, slower))
+        monkeypatch.setattr(speed, "_running", lambda *_, own=factors: contextlib.nullcontext(next(own)))
+        monkeypatch.setattr(speed, "_turn", turn)
+        taken.clear()
+        found = speed.time_both(Code(ROOT), Code(ROOT), (ROOT, ROOT), 20)
+        assert speed.judge(found, nobody).state is state
+        turns = (len(taken) - 4) // 4  # but for the first two of each process
+        assert turns == speed.TURNS if scatter == 0.01 else speed.TURNS < turns <= speed.MOST_TURNS

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import datetime
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from pipelines.nightly.gates import regenerate
 from pipelines.nightly.history import FINDINGS, RUNS, History
 from pipelines.nightly.metrics import CORNERS, POSES
-from pipelines.nightly.page.pictures import Marks, Picture
+from pipelines.nightly.page.frames import rendered_otherwise
+from pipelines.nightly.page.write import Shown
+from pipelines.pages.pictures import Marks, Picture, Side
+from render.targets.image_region import Region
 from tests.pipelines.nightly.simulated import CAMERAS
 
 START = datetime.datetime(2025, 5, 4, 3, 2, tzinfo=datetime.UTC)
@@ -44,6 +49,11 @@ def history(root, nights, slices, suites=("pinned", "fresh"), faulty=True, names
 def pictures(count, names=str):
     """Frames of a board with noise, whose candidate has a bias; the last one's candidate found nothing."""
     return [_picture(i, names, lost=i == count - 1) for i in range(count)]
+
+
+def shown(count, names=str):
+    """`pictures`, and a frame that comes out otherwise."""
+    return Shown(pictures(count, names), _otherwise(names))
 
 
 def _static(series):
@@ -124,13 +134,18 @@ def _picture(i, names, lost):
     old = rng.normal(0.0, 0.005, points.shape)
     new = np.full(points.shape, np.nan) if lost else old + [0.01, 0.0]
     return Picture(
-        "pinned",
-        names(f"regime-0/{CAMERAS[i % 5]}/edge-fit"),
         17 * i + 3,
+        "pinned, " + names(f"regime-0/{CAMERAS[i % 5]}/edge-fit"),
         names("no corner is found any more" if lost else f"corner_x is {0.01:g} px further off"),
-        names(f"python -m pipelines nightly explain 'regime-0/{CAMERAS[i % 5]}/edge-fit' --frame {17 * i + 3}"),
-        crop,
+        names(f"python -m pipelines nightly frame pinned-regime-0 {17 * i + 3}"),
         (700, 500),
-        Marks(points + old - 0.5, old),
-        Marks(points + new - 0.5, new),
+        (Side("baseline", Marks(points + old - 0.5, old), crop), Side("candidate", Marks(points + new - 0.5, new))),
     )
+
+
+def _otherwise(names):
+    stored = np.full((300, 360), 90, np.uint8)
+    rendered = stored.copy()
+    rendered[100:110, 50] += 3
+    again = regenerate.Again(names("pinned-regime-0"), 7, stored, rendered, Region(0, 0, 360, 300), 2e-10)
+    return rendered_otherwise([again], "20260504T030000Z-00000000", Path("nights"))
