@@ -102,3 +102,51 @@ def test_the_place_of_the_board_is_the_frames(root):
         x, y, z = true.R[i] @ centre + true.t[i]
         assert row["distance_mm"] == pytest.approx(np.sqrt(x * x + y * y + z * z), rel=1e-12)
         assert row["field_deg"] == pytest.approx(np.degrees(np.arccos(z / row["distance_mm"])), abs=1e-9)
+
+
+def hide(dataset, points):
+    """Hide some points of the first frame, and say that the others are visible."""
+
+    def put(row):
+        row["visible"] = row["point_id"] not in points
+
+    rewritten(dataset, "keypoints", put)
+
+
+def rescored(root, cli):
+    """Status, reason and gross failure of the first frame, by our solver on detected points."""
+    for path in (root / "scores").glob("*.parquet"):
+        path.unlink()
+    assert cli("score", root, "-q").code == 0
+    path = min((root / "scores").glob("best-detected-exact-all-0*"))
+    row = pq.read_table(path).to_pylist()[0]
+    return row["status"], row["failure_reason"], row["gross_failure"]
+
+
+def test_a_pose_of_a_hidden_target_is_made_up(root, cli):
+    dataset, count = open_dataset(root), len(open_dataset(root).recipe.target.points)
+    hide(dataset, range(4, count))  # four points are left: a pose can be made
+    assert rescored(root, cli) == ("ok", None, False)
+    hide(dataset, range(3, count))
+    assert rescored(root, cli) == ("ok", None, True)
+    assert cli("report", root).code == 0
+    assert "cannot be seen" in (root / "report.html").read_text()
+
+
+def test_what_is_hidden_is_not_missed(root, cli):
+    dataset, count = open_dataset(root), len(open_dataset(root).recipe.target.points)
+
+    def lose(row):
+        row["status"] = "board_not_found"
+        row |= dict.fromkeys(("x_px", "y_px", "var_x_px2", "cov_xy_px2", "var_y_px2"))
+
+    def fail(row):
+        row["status"] = "points_missing"
+        row |= {name: None for name in row if name.startswith(("q_", "t_"))}
+
+    rewritten(dataset, "detections", lose)
+    rewritten(dataset, "estimates", fail)
+    hide(dataset, range(count))
+    assert rescored(root, cli) == ("points_missing", "hidden", False)
+    hide(dataset, range(10, count))
+    assert rescored(root, cli) == ("points_missing", "board_not_found, hidden", True)
