@@ -36,7 +36,8 @@ def occluders(count: int, target: AnyTarget, rng: np.random.Generator) -> Object
     found: Objects = {}
     for i in range(count):
         before, radius = rng.uniform(*BEFORE_MM), rng.uniform(THIN_MM, THICK_MM)
-        at = np.array([rng.uniform(x0, x1), rng.uniform(y0, y1), 0.0]) + before * FRONT
+        x, y = (rng.uniform(low + 0.2 * (high - low), high - 0.2 * (high - low)) for low, high in ((x0, x1), (y0, y1)))
+        at = np.array([x, y, 0.0]) + before * FRONT
         if i % 2 == 0:
             tilt = rng.normal(0.0, 0.25)
             along = np.cos(tilt) * UP + np.sin(tilt) * RIGHT
