@@ -12,7 +12,7 @@ from render.targets.chessboard import Chessboard
 from render.targets.kinds import AnyTarget
 from render.targets.mesh import Mesh, board_mesh
 from render.world.materials import Material, diffuse
-from render.world.shapes import FRONT, UP, MeshShape, Objects, Shape, box, frame_matrix, pole
+from render.world.shapes import FRONT, RIGHT, UP, MeshShape, Objects, Shape, box, frame_matrix, pole
 
 BOARD, CIRCLE = "board", "circle"
 BACK = (0.3, 0.3, 0.3)  # reflectance of a board's back
@@ -29,14 +29,14 @@ def target_shapes(target: AnyTarget, coat: Coat) -> Objects:
 def circle_shape(target: Chessboard) -> Shape:
     """The raised disc, seen from the front."""
     radius = target.circle_radius_mm
-    matrix = frame_matrix(*(np.diag([radius, radius, 1.0])), target.circle_centre)
+    matrix = frame_matrix(radius * RIGHT, -radius * UP, -FRONT, target.circle_centre)
     paper = {"type": "diffuse", "reflectance": {"type": "uniform", "value": target.circle}}
     return {"type": "disk", "flip_normals": True, "to_world": matrix, "bsdf": paper}
 
 
 def card_shapes(target: AnyTarget) -> Objects:
     """A matt card as white as the board in the board's place, to meter light on."""
-    return {BOARD: MeshShape(board_mesh(target), diffuse((target.white,) * 3))}
+    return {BOARD: MeshShape(board_mesh(target), diffuse((target.white, target.white, target.white)))}
 
 
 def stand_shapes(target: AnyTarget, floor_mm: float) -> Objects:

@@ -54,7 +54,8 @@ def box(centre: Array, size: tuple[float, float, float], turn_rad: float, bsdf: 
 
 def ball(centre: Array, radius: float, bsdf: Shape) -> Shape:
     """A sphere."""
-    return {"type": "sphere", "to_world": frame_matrix(*(radius * np.eye(3)), centre), "bsdf": bsdf}
+    x, y, z = radius * np.eye(3)
+    return {"type": "sphere", "to_world": frame_matrix(x, y, z, centre), "bsdf": bsdf}
 
 
 def pole(low: Array, high: Array, radius: float, bsdf: Shape) -> Shape:
