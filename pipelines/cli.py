@@ -33,6 +33,7 @@ COMMANDS: tuple[tuple[Callable[..., None], str], ...] = (
     (tools.doctor, "doctor"),
     (tools.bench, "bench demo --only render --only solver --out bench.md"),
     (tools.paper, "paper --points-only --out out/paper"),
+    (tools.target, "target charuco --out board.pdf"),
     (tools.recipes, "recipes"),
     (tools.describe, "describe demo"),
 )

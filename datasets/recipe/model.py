@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from importlib import resources
 from pathlib import Path
@@ -185,6 +185,17 @@ def _completed(data: dict[str, Any], source: str) -> dict[str, Any]:
     if "cameras" in data:
         data["cameras"] = resolved(data["cameras"], source)
     return data
+
+
+def target_of(pattern: str, values: Sequence[str]) -> AnyTarget:
+    """A target with a pattern's defaults but for some values, each KEY=VALUE as a line of a recipe's [target].
+
+    Raises:
+        UserError: an unknown pattern or key, a wrong value, or no KEY=VALUE.
+    """
+    lines = [f"pattern = {json.dumps(pattern)}", *values]
+    text = "\n".join(['name = "target"', 'cameras = "paper"', "[target]", *lines])
+    return parse_recipe(text, "target").target
 
 
 def load_recipe(name: str) -> tuple[Recipe, str]:

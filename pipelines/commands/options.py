@@ -75,6 +75,19 @@ Use = Annotated[str, typer.Option("--use", help="Object points: four or all.")]
 NoisePx = Annotated[float, typer.Option("--noise-px", help="Standard deviation of truth+noise, px per axis.")]
 Draws = Annotated[int, typer.Option("--draws", help="Draws of truth+noise.")]
 
+TargetRecipe = Annotated[
+    str | None, typer.Argument(metavar="[RECIPE]", help="Whose target: a .toml file, or a name from `recipes`.")
+]
+Pattern = Annotated[
+    str | None,
+    typer.Option(help="Instead of a recipe: chessboard, plain_chessboard, charuco, aprilgrid or circles."),
+]
+TargetValues = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="A key of [target] as in a recipe; may be given again."),
+]
+Printed = Annotated[Path, typer.Option("--out", metavar="FILE", help="File to write, .pdf or .svg.")]
+
 Poses = Annotated[int, typer.Option(min=1, help="Poses measured with each camera.")]
 Only = Annotated[
     list[str] | None,

@@ -19,7 +19,7 @@ from pipelines.stages.estimate_images import find_estimator
 from pipelines.stages.import_poses import import_poses
 from pipelines.stages.kernels import compiled_ahead, wait_for
 from pipelines.stages.missing import Execution, Stage, run_missing
-from pipelines.stages.settings import Setting, System, check_detector
+from pipelines.stages.settings import Setting, System, check_detector, check_target
 
 MAKE_AGAIN = "; --overwrite makes them again"
 
@@ -37,9 +37,10 @@ def run_detect(
 
     kernels: the compiled functions, if they have been begun before.
     Raises:
-        UserError: an unknown detector.
+        UserError: an unknown detector, or one that does not find this kind of target.
     """
     check_detector(detector)
+    check_target(detector, dataset.recipe.target)
     with compiled_ahead(dataset, execution.part, detector, kernels) as needed:
         wait_for(needed, execution.console)
     stage = Stage(
