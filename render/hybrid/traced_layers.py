@@ -1,0 +1,108 @@
+"""What rays through pixels see: the shiny layer of the board, what stands behind the target, and everything."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any  # Any: Mitsuba's objects, whose types depend on its variant
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render import backend
+from render.device import DeviceBool, DeviceFloat, DeviceScene, DeviceSpectrum, DeviceVector3
+from render.hybrid.outgoing import NUMBERS, direct_light, rest_of_light
+from render.hybrid.pixel_rays import PixelRays, Pixels, RayCamera
+from render.hybrid.surface_points import surface_points
+from render.targets import Target
+
+TARGET_SURFACES = 2  # that a ray may pass: the raised circle and the board
+INSET_MM = 1e-3  # from the board's border, for points that are moved onto it
+HIDDEN_WEIGHT = 1e-4  # of rays that the target stops, beside those that pass it
+RELATIVE_DEPTH = 1e-4  # by which an object must be nearer than the target to be in front of it
+
+Key = tuple[int, int]  # rays for a pixel, and seed
+
+Radiance = NDArray[np.float32]  # (n, 3)
+
+
+@dataclass(frozen=True, slots=True)
+class TracedScene:
+    """A Mitsuba scene with the target in it."""
+
+    scene: DeviceScene
+    path: Any  # integrator for rays of the camera
+    path_beyond: Any  # integrator for rays that leave a surface; it sees all light sources
+    target: DeviceScene  # the target alone
+
+    def everything(self, rays: RayCamera, pixels: Pixels, samples: int, seed: int) -> Radiance:
+        """Mean radiance of pixels, by plain path tracing."""
+
+        def radiance(found: PixelRays) -> tuple[DeviceSpectrum, DeviceFloat]:
+            mi, dr = backend.load(), backend.jit()
+            ray = mi.RayDifferential3f(mi.Ray3f(found.origin, found.direction))
+            light, _, _ = self.path.sample(self.scene, found.sampler, ray, None, found.seen)
+            return dr.select(found.seen, light, 0.0), mi.Float(1.0) + dr.zeros(mi.Float, dr.width(found.seen))
+
+        return rays.mean_over_pixels(pixels, samples, seed, radiance)[0]
+
+    def behind(self, rays: RayCamera, pixels: Pixels, samples: int, seed: int) -> Radiance:
+        """Mean radiance of what pixels see beside the target; where no ray passes it, of what stands behind it."""
+
+        def radiance(found: PixelRays) -> tuple[DeviceSpectrum, DeviceFloat]:
+            mi, dr = backend.load(), backend.jit()
+            ray, missed = self._past_target(found)
+            light, _, _ = self.path.sample(self.scene, found.sampler, mi.RayDifferential3f(ray), None, found.seen)
+            weight = dr.select(missed, 1.0, HIDDEN_WEIGHT)
+            weight = dr.select(found.seen, weight, 0.0)
+            return light * weight, weight
+
+        total, weight = rays.mean_over_pixels(pixels, samples, seed, radiance)
+        return total / np.maximum(weight, np.float32(1e-12))[:, None]
+
+    def _past_target(self, rays: PixelRays) -> tuple[Any, DeviceBool]:
+        """Rays that begin behind the target where they meet it, and whether they do not."""
+        mi, dr = backend.load(), backend.jit()
+        ray, missed = mi.Ray3f(rays.origin, rays.direction), mi.Bool(True)
+        for _ in range(TARGET_SURFACES):
+            hit = self.target.ray_intersect(ray)
+            missed &= ~hit.is_valid()
+            ray.o = dr.select(hit.is_valid(), hit.spawn_ray(rays.direction).o, ray.o)
+        return ray, missed
+
+    def blocked(self, rays: RayCamera, pixels: Pixels, samples: int, seed: int) -> NDArray[np.float32]:
+        """(n,) share of pixels' rays that meet something in front of the target."""
+
+        def radiance(found: PixelRays) -> tuple[DeviceSpectrum, DeviceFloat]:
+            mi, dr = backend.load(), backend.jit()
+            ray = mi.Ray3f(found.origin, found.direction)
+            first, target = self.scene.ray_intersect(ray), self.target.ray_intersect(ray)
+            in_front = target.is_valid() & (first.t < target.t * (1.0 - RELATIVE_DEPTH)) & found.seen
+            return dr.zeros(mi.Spectrum, dr.width(in_front)), dr.select(in_front, 1.0, 0.0)
+
+        return rays.mean_over_pixels(pixels, samples, seed, radiance)[1]
+
+    def gloss(
+        self, coat: Any, extent_mm: tuple[float, float, float, float], rays: RayCamera, pixels: Pixels, key: Key
+    ) -> Radiance:
+        """Mean radiance of the board's shiny layer, as if the board's plane filled the pixels.
+
+        coat: BSDF of the board without its paint. extent_mm: of the board; rays beside it take its nearest point.
+        """
+        x0, x1, y0, y1 = extent_mm
+        samples, seed = key
+
+        def radiance(found: PixelRays) -> tuple[DeviceSpectrum, DeviceFloat]:
+            mi, dr = backend.load(), backend.jit()
+            low, high = dr.opaque(mi.Point2f, [x0 + INSET_MM, y0 + INSET_MM]), dr.opaque(mi.Point2f, [x1 - INSET_MM, y1 - INSET_MM])
+            length = -found.origin.z / found.direction.z
+            x, y = found.origin.x + length * found.direction.x, found.origin.y + length * found.direction.y
+            place = mi.Vector3f(dr.clip(x, low.x, high.x), dr.clip(y, low.y, high.y), 0.0)
+            toward = dr.normalize(found.origin - place)
+            surface = surface_points(place, mi.Vector3f(0.0, 0.0, -1.0), toward)
+            light = direct_light(self.scene, surface, coat, found.numbers)
+            light += rest_of_light(self.scene, self.path_beyond, surface, coat, found.numbers, found.sampler)
+            weight = dr.select(found.seen & (found.origin.z < 0.0), 1.0, 0.0)
+            return light * weight, weight
+
+        total, weight = rays.mean_over_pixels(pixels, samples, seed, radiance, NUMBERS)
+        return total / np.maximum(weight, np.float32(1e-12))[:, None]
