@@ -11,8 +11,8 @@ from datasets.recipe.model import Recipe
 from eposit import Camera, Pose
 from eposit.arrays import Array
 from render.light import Light
-from render.pathtraced.scene import radiances
 from render.targets.chessboard import Chessboard
+from render.world.studio import radiances
 
 LENS = "equisolid"  # the lens that Cycles and we both have
 LENS_MM = 10.5  # any focal length does, as the sensor's width is chosen to match

@@ -1,0 +1,84 @@
+"""Things around and in front of the target: clutter, occluders, other chessboards."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from eposit.arrays import Array
+from eposit.pose import rotation_from_vector
+from render.targets.chessboard import Chessboard
+from render.world.boards import other_board
+from render.world.materials import random_material
+from render.world.shapes import FRONT, RIGHT, UP, Objects, Shape, ball, box, pole
+
+GAP_MM = 150.0  # between the target's border and what stands beside it
+SIDE_MM = 1500.0  # width of the strip beside the target where things stand
+BEFORE_MM = (120.0, 500.0)  # of occluders before the target
+THIN_MM, THICK_MM = 8.0, 40.0  # radii of occluders
+FIELD_OF_THINGS_MM = 900.0  # they lie so far before and behind the target's plane
+
+
+def clutter(count: int, target: Chessboard, rng: np.random.Generator) -> Objects:
+    """Boxes, balls and rods of many materials, hanging around the target and never before it."""
+    found: Objects = {}
+    for i in range(count):
+        size, at = rng.uniform(60.0, 400.0), _beside(target, rng)
+        found[f"clutter_{i}"] = _thing(at, size, rng)
+    return found
+
+
+def occluders(count: int, target: Chessboard, rng: np.random.Generator) -> Objects:
+    """Poles and balls before the target: each hides a part of it from most places."""
+    x0, x1, y0, y1 = target.extent_mm
+    found: Objects = {}
+    for i in range(count):
+        before, radius = rng.uniform(*BEFORE_MM), rng.uniform(THIN_MM, THICK_MM)
+        at = np.array([rng.uniform(x0, x1), rng.uniform(y0, y1), 0.0]) + before * FRONT
+        if rng.random() < 0.5:
+            tilt = rng.normal(0.0, 0.25)
+            along = np.cos(tilt) * UP + np.sin(tilt) * RIGHT
+            long = 0.7 * np.hypot(x1 - x0, y1 - y0)
+            found[f"occluder_{i}"] = pole(at - long * along, at + long * along, radius, random_material(rng))
+        else:
+            found[f"occluder_{i}"] = ball(at, 2.0 * radius, random_material(rng))
+    return found
+
+
+def other_boards(count: int, target: Chessboard, rng: np.random.Generator) -> Objects:
+    """Chessboards of other sizes beside the target, turned towards the camera more or less."""
+    found: Objects = {}
+    for i in range(count):
+        columns, rows = (int(n) for n in rng.integers(4, 11, 2))
+        if (columns, rows) in ((target.columns, target.rows), (target.rows, target.columns)):
+            columns += 1
+        square = float(rng.uniform(0.4, 0.8)) * target.square_mm
+        matrix = np.eye(4)
+        # z out of the board's front is -z of the object frame: half a turn about x, then a random lean.
+        matrix[:3, :3] = rotation_from_vector(rng.normal(0.0, 0.35, 3)) @ np.diag([1.0, -1.0, -1.0])
+        matrix[:3, 3] = _beside(target, rng)
+        found[f"other_board_{i}"] = other_board(columns, rows, square, matrix)
+    return found
+
+
+def _beside(target: Chessboard, rng: np.random.Generator) -> Array:
+    """(3,) a place left of, right of, above or below the target, in a strip of SIDE_MM about its plane."""
+    x0, x1, y0, y1 = target.extent_mm
+    half = 0.5 * np.array([x1 - x0, y1 - y0]) + GAP_MM
+    strip, side = rng.uniform(150.0, SIDE_MM), int(rng.integers(4))
+    along = rng.uniform(-1.2, 1.2)
+    offset = np.array([half[0] + strip, along * half[1]]) if side < 2 else np.array([along * half[0], half[1] + strip])
+    sign = 1.0 if side % 2 == 0 else -1.0
+    depth = rng.uniform(-0.3, 0.6) * FIELD_OF_THINGS_MM
+    return target.board_centre + np.array([sign * offset[0], sign * offset[1], depth])
+
+
+def _thing(at: Array, size: float, rng: np.random.Generator) -> Shape:
+    kind, turn, material = rng.random(), rng.uniform(0.0, np.pi), random_material(rng)
+    if kind < 0.5:
+        width, height, depth = rng.uniform(0.3, 1.0, 3) * size
+        return box(at, (width, height, depth), turn, material)
+    if kind < 0.8:
+        return ball(at, 0.4 * size, material)
+    direction = rng.normal(0.0, 1.0, 3)
+    half = size * direction / np.linalg.norm(direction)
+    return pole(at - half, at + half, 0.08 * size + 5.0, material)
