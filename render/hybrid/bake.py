@@ -19,8 +19,8 @@ from render import backend
 from render.device import DeviceFloat, DeviceScene, DeviceSpectrum
 from render.hybrid.keyed_sampler import keyed_sampler, lattice_numbers
 from render.hybrid.outgoing import NUMBERS, direct_light, rest_of_light
-from render.hybrid.smooth import noise, smoothed
-from render.hybrid.surface_points import surface_points
+from render.hybrid.smooth import NARROW, WIDTHS, noise, smoothed
+from render.hybrid.placement import Placement
 from render.hybrid.texels import Grid, coarse_grid, disc_grid, fine_grid, magnified, paste
 from render.targets.chessboard import Chessboard
 
@@ -37,6 +37,7 @@ class BakedLight:
     """Radiance over reflectance: what a white matt surface would send out."""
 
     board: NDArray[np.float32]  # (rows, columns, 3) over the target's extent, texel centres
+    edges: NDArray[np.float32]  # (rows, columns) above 0 where shadows have edges
     disc: NDArray[np.float32]  # (3,) on the raised circle
 
 
@@ -45,6 +46,7 @@ class Baker:
     """A scene with the target in it, ready for its light to be baked."""
 
     scene: DeviceScene
+    placement: Placement  # of the target in the scene
     path: Any  # integrator for what follows the first reflection
     sheet: Any  # BSDF of a white board, without gloss
     samples: int  # rays for a texel's direct light, `REST_SHARE` times fewer for the rest
@@ -55,11 +57,13 @@ class Baker:
         coarse, fine = coarse_grid(target), fine_grid(target)
         direct, rest = self._both(coarse, 0)
         board = magnified(_smooth(direct), coarse, fine)
-        self._refine(board, fine, magnified(_shadow_edges(direct)[..., None], coarse, fine)[..., 0] > 0.0)
+        edges = magnified(_shadow_edges(direct)[..., None], coarse, fine)[..., 0]
+        self._refine(board, fine, edges > 0.0)
         board += magnified(_smooth(rest), coarse, fine)
         near, place = disc_grid(target)
-        paste(board, sum(map(_smooth, self._both(near, 1))), place)
-        return BakedLight(board.astype(np.float32), self._disc(target).astype(np.float32))
+        direct, rest = self._both(near, 1)
+        paste(board, _smooth(direct, NARROW) + _smooth(rest, NARROW), place)
+        return BakedLight(*(part.astype(np.float32) for part in (board, edges, self._disc(target))))
 
     def _both(self, grid: Grid, number: int) -> list[Array]:
         """Direct light and the rest of it on a grid, each (2, rows, columns, 3) by two halves of the rays."""
@@ -114,7 +118,7 @@ class Baker:
         x += (numbers[NUMBERS] - 0.5) * dr.opaque(mi.Float, step[0])
         y += (numbers[NUMBERS + 1] - 0.5) * dr.opaque(mi.Float, step[1])
         front = mi.Vector3f(0.0, 0.0, -1.0)
-        surface = surface_points(mi.Vector3f(x, y, z), front, front)
+        surface = self.placement.surface(mi.Vector3f(x, y, z), front, front)
         value = light(surface, numbers, keyed_sampler(pixel, ray, seed))
         dr.eval(value)
         means = [np.array(dr.block_sum(channel, half), np.float64) / half for channel in value]
@@ -127,8 +131,8 @@ class Baker:
         return rest_of_light(self.scene, self.path, surface, self.sheet, numbers, sampler)
 
 
-def _smooth(halves: Array) -> Array:
-    return smoothed(halves.mean(axis=0), noise(halves))
+def _smooth(halves: Array, widths: tuple[float, ...] = WIDTHS) -> Array:
+    return smoothed(halves.mean(axis=0), noise(halves), widths)
 
 
 def _shadow_edges(halves: Array) -> Array:

@@ -10,9 +10,12 @@ from dataclasses import dataclass
 from typing import Any  # Any: Mitsuba describes materials by dictionaries of mixed values
 
 import numpy as np
+from numpy.typing import NDArray
 
+from eposit import Camera, Pose
 from eposit.arrays import Array
 from render import backend
+from render.targets.image_region import Region
 
 ANGLES = 512  # cosines at which the layer's transmission is tabulated
 WHITE, NONE = ({"type": "rgb", "value": [value] * 3} for value in (1.0, 0.0))
@@ -25,6 +28,16 @@ class Coat:
     paint: Any  # BSDF of white paint below the layer
     gloss: Any | None  # BSDF of the layer alone; None for a matt surface
     transmission: Array  # (ANGLES,) light of the paint at cosines from 0 to 1 to the normal, by that along the normal
+
+    def transmitted(self, camera: Camera, cam_from_obj: Pose, region: Region) -> NDArray[np.float32]:
+        """(height, width) `transmission` at a region's pixels, for a board in the plane z = 0."""
+        if self.gloss is None:
+            return np.ones((region.height, region.width), np.float32)
+        rows, columns = np.mgrid[region.pixels]
+        bearings = camera.bearing(np.stack((columns, rows), axis=-1).reshape(-1, 2).astype(float))
+        cosine = np.nan_to_num(np.abs(bearings @ cam_from_obj.R[:, 2]))
+        found = np.interp(cosine, np.linspace(0.0, 1.0, ANGLES), self.transmission)
+        return found.reshape(region.height, region.width).astype(np.float32)
 
 
 def coat(material: dict[str, Any]) -> Coat:

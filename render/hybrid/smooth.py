@@ -8,13 +8,14 @@ from numpy.typing import NDArray
 from eposit.arrays import Array
 
 WIDTHS = (1.0, 2.0, 4.0)  # standard deviations of the averages, in texels
+NARROW = WIDTHS[:1]  # where light bends so near to what is seen that a wide average would darken it unnoticed
 SIGNIFICANT = 3.0  # standard errors by which an average may differ from finer ones
 NOISE_WIDTH = 1.5  # texels
 SUPPORT = 3  # of the nine texels around one that must differ, too: a stray bright path does so alone
 REACH = 3.0  # standard deviations where a gaussian is cut off
 
 
-def smoothed(values: Array, variance: Array) -> Array:
+def smoothed(values: Array, variance: Array, widths: tuple[float, ...] = WIDTHS) -> Array:
     """(rows, columns, channels) map, each texel averaged as widely as its surroundings allow.
 
     variance: of the noise of each texel, same shape. A texel takes the widest gaussian whose average differs by no more
@@ -25,7 +26,7 @@ def smoothed(values: Array, variance: Array) -> Array:
     kept = values.copy()
     open_ = np.ones(values.shape[:2], bool)
     finer = [(values, variance)]
-    for width in WIDTHS:
+    for width in widths:
         wide, noise2 = _gaussian(values, width), _gaussian(variance, width) / (4.0 * np.pi * width * width)
         for value, own2 in finer:
             differs = np.any(np.abs(wide - value) > SIGNIFICANT * np.sqrt(own2 + noise2), axis=2)

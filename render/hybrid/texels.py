@@ -51,9 +51,14 @@ def coarse_grid(target: Chessboard) -> Grid:
     return _over(target, round(fine.columns / factor), round(fine.rows / factor))
 
 
+def shade_reach(target: Chessboard) -> float:
+    """Distance from the circle's axis, mm, within which it shades the board."""
+    return target.circle_radius_mm + NEAR_HEIGHTS * target.circle_height_mm
+
+
 def disc_grid(target: Chessboard) -> tuple[Grid, tuple[slice, slice]]:
     """The part of the fine grid around the raised circle, where light is shaded, and its rows and columns there."""
-    fine, reach = fine_grid(target), target.circle_radius_mm + NEAR_HEIGHTS * target.circle_height_mm
+    fine, reach = fine_grid(target), shade_reach(target)
     bounds: list[tuple[int, int]] = []
     for axis, (count, low) in enumerate(((fine.columns, fine.x), (fine.rows, fine.y))):
         middle = target.circle_centre[axis] - low

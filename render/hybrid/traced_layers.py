@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render import backend
-from render.device import DeviceBool, DeviceFloat, DeviceScene, DeviceSpectrum, DeviceVector3
+from render.device import DeviceBool, DeviceFloat, DeviceScene, DeviceSpectrum
 from render.hybrid.outgoing import NUMBERS, direct_light, rest_of_light
 from render.hybrid.pixel_rays import PixelRays, Pixels, RayCamera
-from render.hybrid.surface_points import surface_points
-from render.targets import Target
+from render.hybrid.placement import Placement
 
 TARGET_SURFACES = 2  # that a ray may pass: the raised circle and the board
 INSET_MM = 1e-3  # from the board's border, for points that are moved onto it
@@ -30,18 +29,19 @@ class TracedScene:
     """A Mitsuba scene with the target in it."""
 
     scene: DeviceScene
+    target: DeviceScene  # the target alone, in the object frame
+    placement: Placement  # of the object frame in the scene
     path: Any  # integrator for rays of the camera
     path_beyond: Any  # integrator for rays that leave a surface; it sees all light sources
-    target: DeviceScene  # the target alone
+    escaped: float  # radiance of what rays of the camera meet that leave the scene, beside the scene's own
 
     def everything(self, rays: RayCamera, pixels: Pixels, samples: int, seed: int) -> Radiance:
         """Mean radiance of pixels, by plain path tracing."""
 
         def radiance(found: PixelRays) -> tuple[DeviceSpectrum, DeviceFloat]:
             mi, dr = backend.load(), backend.jit()
-            ray = mi.RayDifferential3f(mi.Ray3f(found.origin, found.direction))
-            light, _, _ = self.path.sample(self.scene, found.sampler, ray, None, found.seen)
-            return dr.select(found.seen, light, 0.0), mi.Float(1.0) + dr.zeros(mi.Float, dr.width(found.seen))
+            light = self._along(mi.Ray3f(found.origin, found.direction), found)
+            return light, dr.select(found.seen, 1.0, 0.0)
 
         return rays.mean_over_pixels(pixels, samples, seed, radiance)[0]
 
@@ -51,13 +51,19 @@ class TracedScene:
         def radiance(found: PixelRays) -> tuple[DeviceSpectrum, DeviceFloat]:
             mi, dr = backend.load(), backend.jit()
             ray, missed = self._past_target(found)
-            light, _, _ = self.path.sample(self.scene, found.sampler, mi.RayDifferential3f(ray), None, found.seen)
-            weight = dr.select(missed, 1.0, HIDDEN_WEIGHT)
-            weight = dr.select(found.seen, weight, 0.0)
-            return light * weight, weight
+            weight = dr.select(found.seen, dr.select(missed, 1.0, HIDDEN_WEIGHT), 0.0)
+            return self._along(ray, found) * weight, weight
 
         total, weight = rays.mean_over_pixels(pixels, samples, seed, radiance)
         return total / np.maximum(weight, np.float32(1e-12))[:, None]
+
+    def _along(self, ray: Any, rays: PixelRays) -> DeviceSpectrum:
+        """Radiance along rays of the object frame; none where the lens does not see."""
+        mi, dr = backend.load(), backend.jit()
+        placed = mi.RayDifferential3f(self.placement.ray(ray))
+        light, meets, _ = self.path.sample(self.scene, rays.sampler, placed, None, rays.seen)
+        light += dr.select(meets, 0.0, dr.opaque(mi.Float, self.escaped))
+        return dr.select(rays.seen, light, 0.0)
 
     def _past_target(self, rays: PixelRays) -> tuple[Any, DeviceBool]:
         """Rays that begin behind the target where they meet it, and whether they do not."""
@@ -75,8 +81,9 @@ class TracedScene:
         def radiance(found: PixelRays) -> tuple[DeviceSpectrum, DeviceFloat]:
             mi, dr = backend.load(), backend.jit()
             ray = mi.Ray3f(found.origin, found.direction)
-            first, target = self.scene.ray_intersect(ray), self.target.ray_intersect(ray)
-            in_front = target.is_valid() & (first.t < target.t * (1.0 - RELATIVE_DEPTH)) & found.seen
+            first, target = self.scene.ray_intersect(self.placement.ray(ray)), self.target.ray_intersect(ray)
+            limit = target.t * self.placement.scale * (1.0 - RELATIVE_DEPTH)
+            in_front = target.is_valid() & (first.t < limit) & found.seen
             return dr.zeros(mi.Spectrum, dr.width(in_front)), dr.select(in_front, 1.0, 0.0)
 
         return rays.mean_over_pixels(pixels, samples, seed, radiance)[1]
@@ -88,17 +95,17 @@ class TracedScene:
 
         coat: BSDF of the board without its paint. extent_mm: of the board; rays beside it take its nearest point.
         """
-        x0, x1, y0, y1 = extent_mm
         samples, seed = key
+        inset = np.array(extent_mm) + INSET_MM * np.array([1.0, -1.0, 1.0, -1.0])
 
         def radiance(found: PixelRays) -> tuple[DeviceSpectrum, DeviceFloat]:
             mi, dr = backend.load(), backend.jit()
-            low, high = dr.opaque(mi.Point2f, [x0 + INSET_MM, y0 + INSET_MM]), dr.opaque(mi.Point2f, [x1 - INSET_MM, y1 - INSET_MM])
+            left, right, top, bottom = (dr.opaque(mi.Float, value) for value in inset)
             length = -found.origin.z / found.direction.z
             x, y = found.origin.x + length * found.direction.x, found.origin.y + length * found.direction.y
-            place = mi.Vector3f(dr.clip(x, low.x, high.x), dr.clip(y, low.y, high.y), 0.0)
+            place = mi.Vector3f(dr.clip(x, left, right), dr.clip(y, top, bottom), 0.0)
             toward = dr.normalize(found.origin - place)
-            surface = surface_points(place, mi.Vector3f(0.0, 0.0, -1.0), toward)
+            surface = self.placement.surface(place, mi.Vector3f(0.0, 0.0, -1.0), toward)
             light = direct_light(self.scene, surface, coat, found.numbers)
             light += rest_of_light(self.scene, self.path_beyond, surface, coat, found.numbers, found.sampler)
             weight = dr.select(found.seen & (found.origin.z < 0.0), 1.0, 0.0)
