@@ -20,6 +20,8 @@ from datasets.trajectories.view import PosedFrame, hand_held
 from eposit import Pose
 from render.sensor.motion import PoseRate
 from render.sensor.presets import SensorModel
+from render.world import WorldDraw, draw_world
+from render.world.room import contains
 
 SHARDS = 16  # of a recipe that does not say how many frames a shard has
 LEAST_SHARD_FRAMES, MOST_SHARD_FRAMES = 10, 200
@@ -33,6 +35,7 @@ class Stream(IntEnum):
     SENSOR = 2  # noise and the light's direction, keyed by frame
     POSE = 3  # scattered poses, keyed by pose
     HAND = 4  # rates of a hand-held board, keyed by pose
+    WORLD = 5  # draws of the world, keyed by pose, or by 0 where it is drawn once
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +51,7 @@ class Frame:
     sensor: SensorModel
     render_seed: int  # 32 bits
     sensor_seed: int  # 63 bits
+    world: WorldDraw
 
 
 def rng_for(seed: int, stream: Stream, *key: int) -> np.random.Generator:
@@ -65,14 +69,14 @@ def plan(recipe: Recipe) -> tuple[Frame, ...]:
     """
     frames: list[Frame] = []
     for pose_id, view in enumerate(_views(recipe)):
+        drawn = _world(recipe, pose_id)
         for camera in _planned(recipe, view.cam_from_obj):
             frame_id = len(frames)
             render_seed = int(rng_for(recipe.seed, Stream.RENDER, frame_id).integers(2**32))
             sensor_seed = int(rng_for(recipe.seed, Stream.SENSOR, frame_id).integers(2**63))
-            pose, sensor = view.cam_from_obj, _sensor(recipe, view)
-            frames.append(
-                Frame(frame_id, pose_id, view.time_s, camera, pose, view.rate, sensor, render_seed, sensor_seed)
-            )
+            pose, sensor = view.cam_from_obj, _sensor(recipe, view, drawn)
+            place = frame_id, pose_id, view.time_s, camera, pose, view.rate
+            frames.append(Frame(*place, sensor, render_seed, sensor_seed, drawn))
     for frame in frames:
         fault = _fault(frame.camera, frame.cam_from_obj, recipe)
         if fault:
@@ -135,10 +139,14 @@ def _stands(path: FieldAngles | Scatter | Listed, recipe: Recipe) -> Iterable[tu
     return ((pose, None) for pose in poses)
 
 
-def _sensor(recipe: Recipe, view: PosedFrame) -> SensorModel:
-    if view.defocus_radius_px is None:
-        return recipe.sensor
-    return replace(recipe.sensor, defocus_radius_px=view.defocus_radius_px)
+def _world(recipe: Recipe, pose_id: int) -> WorldDraw:
+    key = pose_id if recipe.world.draw == "pose" else 0
+    return draw_world(recipe.world, rng_for(recipe.seed, Stream.WORLD, key))
+
+
+def _sensor(recipe: Recipe, view: PosedFrame, drawn: WorldDraw) -> SensorModel:
+    model = replace(recipe.sensor, exposure=recipe.sensor.exposure * drawn.exposure)
+    return model if view.defocus_radius_px is None else replace(model, defocus_radius_px=view.defocus_radius_px)
 
 
 def _scattered(path: Scatter, recipe: Recipe) -> Iterator[Pose]:
@@ -169,6 +177,8 @@ def _fault(spec: CameraSpec, pose: Pose, recipe: Recipe) -> str | None:
     camera, points = spec.true_camera(), pose.apply(recipe.target.points)
     if pose.inverse().t[2] >= -recipe.target.circle_height_mm:
         return "the camera is behind the board; turn the target's front towards it"
+    if recipe.world.surround == "room" and not contains(recipe.world, recipe.target, pose.inverse().t):
+        return "the camera is outside the room; increase world.room_mm, or world.floor_mm where it is below the floor"
     projected = camera.project(points)
     unseen = int(np.sum(np.isnan(projected).any(axis=1)))
     if unseen == len(points) or (unseen and not recipe.allow_cropped):

@@ -94,10 +94,10 @@ def camera_of(row: dict[str, Any]) -> Camera:
 
 
 def decode_image(image: dict[str, Any], path: Path, frame_id: int) -> NDArray[np.uint8]:
-    """(height, width) grey values of an image of `frames`.
+    """(height, width) grey values of an image of `frames`, of one in colour too.
 
     Raises:
-        UserError: not a grey PNG, or too small to hold a board; the message names the shard.
+        UserError: not an 8-bit PNG, or too small to hold a board; the message names the shard.
     """
     try:
         pixels = decode_png(image["bytes"])

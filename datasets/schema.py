@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+from typing import get_type_hints
+
 import pyarrow as pa
+
+from render.world import WorldDraw
 
 SCHEMA_VERSION = "3"
 MEANING = b"meaning"
@@ -18,6 +23,19 @@ def _floats(meanings: dict[str, str]) -> list[pa.Field]:
     return [_field(name, pa.float64(), meaning) for name, meaning in meanings.items()]
 
 
+_TYPES = {int: pa.int64(), bool: pa.bool_(), float: pa.float64()}
+
+
+def _world_fields() -> list[pa.Field]:
+    """One column for each value that is drawn of a world."""
+    hints = get_type_hints(WorldDraw), get_type_hints(WorldDraw, include_extras=True)
+    return [
+        _field(f"{WORLD_PREFIX}{field.name}", _TYPES[hints[0][field.name]], hints[1][field.name].__metadata__[0])
+        for field in fields(WorldDraw)
+    ]
+
+
+WORLD_PREFIX = "world_"  # before the name of what is drawn of a world; null in recipes without [world]
 _POSE = _floats(
     {f"q_{axis}": f"{axis} of the unit quaternion of cam_from_obj, w >= 0" for axis in "wxyz"}
     | {f"t_{axis}_mm": f"{axis} of the object frame's origin in the camera frame" for axis in "xyz"}
@@ -43,7 +61,7 @@ FRAMES = pa.schema(
         _field("time_s", pa.float64(), "time on the trajectory; the number of the pose where it has no time"),
         _field("camera_name", pa.string(), "camera's name in the recipe"),
         _field("lens", pa.string(), "lens law"),
-        _field("image", _IMAGE, "8-bit grey PNG"),
+        _field("image", _IMAGE, "8-bit PNG, grey or in colour"),
         *_POSE,
         *_floats(
             {
@@ -64,9 +82,11 @@ FRAMES = pa.schema(
             ("region_width_px", "width of the rendered region"),
             ("region_height_px", "height of the rendered region"),
         )),
-        _field("render_seed", pa.int64(), "seed of a path-traced reference; the picture has no random numbers"),
+        _field("render_seed", pa.int64(), "seed of the rays of path-traced pictures; closed forms have none"),
         _field("sensor_seed", pa.int64(), "seed of the noise and of the light's direction"),
         _field("master", pa.string(), "path of the linear-light EXR within the dataset, where these are kept"),
+        _field("truth", pa.string(), "path of the EXR with truth for every pixel within the dataset; null: none asked"),
+        *_world_fields(),
     ]
 )  # fmt: skip
 
@@ -87,8 +107,18 @@ KEYPOINTS = pa.schema(
             }
         ),
         _field("in_image", pa.bool_(), "whether the point lies on the picture"),
+        _field(
+            "visible",
+            pa.bool_(),
+            "whether the point is there, lies on the picture, faces the camera and has nothing before it, by a traced "
+            "ray; null by the closed form, where only the disc stands before the board",
+        ),
     ]
 )
+
+# Columns that older datasets do not have. Where one holds nothing it takes no part in a table's hash, so that a dataset
+# without a world has the hash it always had.
+LATER_COLUMNS = frozenset({"truth", "visible", *(field.name for field in _world_fields())})
 
 DETECTIONS = pa.schema(
     [
@@ -137,7 +167,8 @@ SCORES = pa.schema(
             "failure_reason",
             pa.string(),
             "null where the status is ok; for points_missing what detection says of the points that are missing, or "
-            "beyond_lens where true points have no image; else the status",
+            "beyond_lens where true points have no image; hidden where fewer than four points are visible; else the "
+            "status",
         ),
         *_floats(
             {
@@ -161,7 +192,10 @@ SCORES = pa.schema(
             }
         ),
         _field(
-            "gross_failure", pa.bool_(), "the paper's star: no solution, or a translation at least twice the true one"
+            "gross_failure",
+            pa.bool_(),
+            "the paper's star: no solution, or a translation at least twice the true one; where the target is "
+            "hidden: a solution",
         ),
     ]
 )

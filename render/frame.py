@@ -1,43 +1,126 @@
 """One frame in linear light: rendered in the region that the target can touch, computed everywhere else.
 
-Radiance 1 is the white board at its centre. Outside the region only background and the lens's image circle remain,
-and those need no rays.
+Radiance 1 is the white board at its centre, or on the mean where a world lights it. In the studio only background and
+the lens's image circle remain outside the region, and those need no rays.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from eposit import Camera, Pose
+from eposit.arrays import Mask
 from render import backend
 from render.analytic.image_circle import lens_coverage
 from render.analytic.integrate import integrate_region
+from render.colour import luminance
 from render.device import DeviceScene
 from render.light import Light
 from render.pathtraced.fisheye import sensor_dict
+from render.pathtraced.picture import Viewpoint, prepared, trace_picture
 from render.pathtraced.scene import reference_scene
 from render.region import Image, target_region
 from render.targets.chessboard import Chessboard
 from render.targets.image_region import Region
+from render.truth.pixels import PixelTruth, pixel_truth
+from render.truth.visibility import visible_points
+from render.world import World, WorldDraw
+from render.world.boards import BOARD
+from render.world.compose import Composition
 
 REFERENCE_RAYS = 1 << 24  # in flight while the reference is traced
 
 
 @dataclass(frozen=True, slots=True)
 class LinearImage:
-    """Linear radiance of a region and of the rest."""
+    """Linear radiance of a region and of the rest, in grey or in RGB."""
 
-    radiance: Image  # (height, width) of the region
+    radiance: Image  # (height, width) or (height, width, 3) of the region
     region: Region
-    background: float  # radiance behind the board
+    background: float | Image  # radiance behind the board; or the whole picture, the region among it
+
+    @property
+    def in_colour(self) -> bool:
+        """Whether it is RGB."""
+        return self.radiance.ndim == 3
 
     def full(self, camera: Camera) -> Image:
-        """(camera.height, camera.width) radiance of the whole picture."""
+        """(camera.height, camera.width) or (..., 3) radiance of the whole picture."""
+        if isinstance(self.background, np.ndarray):
+            return self.background.copy()
         picture = (self.background * lens_coverage(camera)).astype(np.float32)
+        if self.in_colour:
+            picture = np.repeat(picture[..., None], 3, axis=2)
         picture[self.region.pixels] = self.radiance
         return picture
+
+
+def render_world(
+    world: World, draw: WorldDraw, target: Chessboard, light: Light, view: Viewpoint, *, samples: int, in_colour: bool
+) -> LinearImage:
+    """Render one frame of a world in linear light, by the world's method.
+
+    samples: of the closed form, as for `render_frame`.
+
+    Raises:
+        ValueError: the target's image lies outside the picture, no light reaches it, or the user's scene cannot be
+            used.
+    """
+    if world.method == "closed":
+        grey = render_frame(target, light, view.camera, view.cam_from_obj, samples=samples)
+        return replace(grey, radiance=np.repeat(grey.radiance[..., None], 3, axis=2)) if in_colour else grey
+    if world.method == "hybrid":
+        raise ValueError("world method 'hybrid' is not there yet; set method to path")
+    near = target_region(target, view.camera, view.cam_from_obj)
+    if world.surround == "studio":  # beyond the target there is nothing but the background
+        film = trace_picture(world, draw, target, light, view, near, near)
+        behind = np.maximum(lens_coverage(view.camera)[near.pixels] - film[..., 3], 0.0)
+        radiance = film[..., :3] + (np.float32(light.background) * behind)[..., None]
+        return LinearImage(_grey_or_colour(radiance, in_colour), near, light.background)
+    whole = Region.whole(view.camera.width, view.camera.height)
+    film = trace_picture(world, draw, target, light, view, near, whole)
+    picture = _grey_or_colour(film[..., :3], in_colour)
+    return LinearImage(picture[near.pixels], near, picture)
+
+
+@dataclass(frozen=True, slots=True)
+class FrameTruth:
+    """Truth of one frame, traced when it is asked for."""
+
+    scene: DeviceScene
+    composition: Composition
+    target: Chessboard
+    camera: Camera
+    cam_from_obj: Pose
+
+    def visible(self) -> Mask:
+        """(n,) whether the camera sees each point of the target."""
+        has_target = BOARD in self.composition.objects
+        place = self.composition.world_from_obj, self.target.points, self.camera, self.cam_from_obj
+        return visible_points(self.scene, *place, has_target=has_target)
+
+    def pixels(self) -> PixelTruth:
+        """Depth, range, normal and object of every pixel."""
+        place = self.composition.world_from_obj, tuple(self.composition.objects), self.camera, self.cam_from_obj
+        return pixel_truth(self.scene, *place)
+
+
+def truth_of(
+    world: World, draw: WorldDraw, target: Chessboard, light: Light, camera: Camera, cam_from_obj: Pose
+) -> FrameTruth:
+    """The truth of one frame, by rays in the scene that its picture shows.
+
+    Raises:
+        ValueError: no light reaches the target, or the user's file cannot be used.
+    """
+    tracer, _ = prepared(world, draw, target, light)
+    return FrameTruth(tracer.scene, tracer.composition, target, camera, cam_from_obj)
+
+
+def _grey_or_colour(rgb: Image, in_colour: bool) -> Image:
+    return np.ascontiguousarray(rgb, np.float32) if in_colour else luminance(rgb)
 
 
 def render_frame(

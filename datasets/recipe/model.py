@@ -18,13 +18,16 @@ from datasets.recipe.camera_sets import SUFFIX, resolved
 from datasets.recipe.cameras import CameraSpec
 from datasets.recipe.cameras import assumed_camera as assumed_camera
 from datasets.recipe.describe import Key, keys_of, sentence, values_of
+from datasets.recipe.outputs import Outputs
 from datasets.recipe.quality import QUALITIES, QualityName, quality_text
+from datasets.recipe.world_file import with_world_file
 from datasets.recipe.written_out import written_out
 from datasets.trajectories import TRAJECTORIES, Trajectory
 from datasets.trajectories.helix import Helix
 from render.light import Light
 from render.sensor.presets import DEFAULT_REGIME, SensorModel, regimes
 from render.targets.chessboard import CIRCLE, Chessboard
+from render.world import World
 
 RECIPES = resources.files("datasets") / "recipes"
 
@@ -63,6 +66,8 @@ class Recipe(BaseModel):
     target: Annotated[Chessboard, Field(description="the board and its circle")] = Chessboard()
     light: Annotated[Light, Field(description="lamp, surrounding, background")] = Light()
     sensor: Annotated[SensorModel, Field(description="linear light to 8 bits")] = SensorModel()
+    world: Annotated[World, Field(description="what surrounds the target, and how its light is computed")] = World()
+    outputs: Annotated[Outputs, Field(description="what the dataset holds beside grey pictures")] = Outputs()
     trajectory: Annotated[Trajectory, Field(discriminator="kind", description="the target's path")] = Helix()
     cameras: Annotated[
         tuple[CameraSpec, ...],
@@ -102,9 +107,18 @@ class Recipe(BaseModel):
         return hash(self.digest())
 
     def digest(self) -> str:
-        """Hash of everything that decides the content; name and description do not, nor how samples are chosen."""
+        """Hash of everything that decides the content; name and description do not, nor how samples are chosen.
+
+        Sections that a recipe leaves out take no part, so that new sections do not change the hashes of old recipes. Of
+        a world's file its hash counts, not its place.
+        """
         content = self.model_dump(mode="json", exclude={"name", "description", "quality"})
         content["samples"] = self.sample_count()
+        for name, default in (("world", World()), ("outputs", Outputs())):
+            if getattr(self, name) == default:
+                del content[name]
+        if "world" in content and self.world.file_sha256:
+            del content["world"]["file"]
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
@@ -159,6 +173,7 @@ def load_recipe(name: str) -> tuple[Recipe, str]:
         except (OSError, UnicodeDecodeError) as error:
             reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
             raise UserError(f"cannot read recipe {name}: {reason}; give a .toml file, or one of {_known()}") from None
+        text = with_world_file(text, Path(name).parent, name)
         return parse_recipe(text, name), written_out(text, name)
     if name not in recipe_names():
         hint = did_you_mean(name, recipe_names())

@@ -24,7 +24,7 @@ from datasets.store.nulls import with_nulls
 from datasets.store.provenance import Provenance
 from datasets.store.refusals import SHARD_NAME, damaged, missing, refused, stage_of, unreadable, unsupported
 from datasets.store.shard_file import DIGEST_KEY, RECIPE_KEY, VERSION_KEY, read_rows, write_rows
-from datasets.store.versions import READABLE, as_begun, upgraded
+from datasets.store.versions import READABLE, as_begun, upgraded, with_later_columns
 
 RECIPE_FILE = "recipe.toml"
 CARD_FILE = "README.md"
@@ -99,10 +99,11 @@ class Dataset:
             UserError: missing, unreadable, truncated, of another recipe or of a version that cannot be read.
         """
         rows = self.stored_rows(path, columns)
-        if _version(rows.schema.metadata) == SCHEMA_VERSION:
-            return rows
         name = path.parent.name
-        return upgraded(rows, name).select(columns or TABLES[name].names)
+        wanted = columns or TABLES[name].names
+        if _version(rows.schema.metadata) != SCHEMA_VERSION:
+            rows = upgraded(rows, name)
+        return with_later_columns(rows, name).select(wanted)
 
     def stored_rows(self, path: Path, columns: list[str] | None = None) -> pa.Table:
         """The rows of one shard as they lie in its file, or those of some columns that are there.

@@ -1,4 +1,4 @@
-"""8-bit grey images as PNG bytes."""
+"""8-bit images, grey or in colour, as PNG bytes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 
 def encode_png(image: NDArray[np.uint8]) -> bytes:
-    """PNG bytes of an 8-bit grey image."""
+    """PNG bytes of an 8-bit image, (height, width) grey or (height, width, 3) RGB."""
     # Differences of rows, their runs and Huffman's code, without a search for longer repeats: noise has none. The
     # order counts: OpenCV's compression level sets the strategy too.
     settings = [
@@ -16,16 +16,27 @@ def encode_png(image: NDArray[np.uint8]) -> bytes:
         *(cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE),
         *(cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_UP),
     ]
-    return cv2.imencode(".png", image, settings)[1].tobytes()
+    stored = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_RGB2BGR)
+    return cv2.imencode(".png", stored, settings)[1].tobytes()
+
+
+def decode_pixels(data: bytes) -> NDArray[np.uint8]:
+    """(height, width) grey or (height, width, 3) RGB values of PNG bytes.
+
+    Raises:
+        ValueError: not an 8-bit image, grey or in colour.
+    """
+    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
+    if image is None or image.dtype != np.uint8 or not (image.ndim == 2 or image.shape[2:] == (3,)):
+        raise ValueError("the image is not an 8-bit PNG, grey or in colour")
+    return (image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2RGB)).astype(np.uint8, copy=False)
 
 
 def decode_png(data: bytes) -> NDArray[np.uint8]:
-    """(height, width) grey values of PNG bytes.
+    """(height, width) grey values of PNG bytes; what OpenCV makes of one in colour.
 
     Raises:
-        ValueError: not a grey 8-bit image.
+        ValueError: as `decode_pixels`.
     """
-    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
-    if image is None or image.ndim != 2 or image.dtype != np.uint8:
-        raise ValueError("the image is not an 8-bit grey PNG")
-    return image.astype(np.uint8, copy=False)
+    pixels = decode_pixels(data)
+    return pixels if pixels.ndim == 2 else cv2.cvtColor(pixels, cv2.COLOR_RGB2GRAY).astype(np.uint8, copy=False)

@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from datasets.recipe.model import Recipe
-from datasets.schema import SCHEMA_VERSION, TABLES
+from datasets.schema import LATER_COLUMNS, SCHEMA_VERSION, TABLES
 from datasets.store.nulls import with_nulls
 from datasets.store.shard_file import RECIPE_KEY
 
@@ -29,6 +29,14 @@ def upgraded(rows: pa.Table, table: str) -> pa.Table:
         field = schema.field(name)
         known = name == "failure_reason" and "status" in rows.column_names
         rows = rows.append_column(field, _reasons(rows) if known else pa.nulls(rows.num_rows, field.type))
+    return rows
+
+
+def with_later_columns(rows: pa.Table, table: str) -> pa.Table:
+    """Rows with a column of nulls for each that the table got after they were written; rows that have all stay."""
+    for field in TABLES[table]:
+        if field.name in LATER_COLUMNS and field.name not in rows.column_names:
+            rows = rows.append_column(field, pa.nulls(rows.num_rows, field.type))
     return rows
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from datasets.rows import numbers
 from datasets.schema import COMPONENTS
 from eposit.arrays import Array, Mask
+from pipelines.stages.failures import HIDDEN
 from pipelines.statistics import FEW, bootstrap, median, percentile95, rate
 
 ERRORS = {
@@ -36,7 +37,7 @@ class Series:
     frame_id: NDArray[np.int64]
     errors: dict[str, Array]  # column to values, NaN for failures
     normalised: Array  # (n, 6) errors over their stated standard deviations, NaN without
-    failed: Mask
+    failed: Mask  # no pose, of a target that can be seen
     gross: Mask
 
 
@@ -47,7 +48,8 @@ def series(scores: pa.Table) -> list[Series]:
     for name in dict.fromkeys(names):
         part = scores.filter(pa.array([other == name for other in names]))
         errors = dict(zip(ERRORS, numbers(part, *ERRORS).T, strict=True))
-        failed = np.array([status != "ok" for status in part["status"].to_pylist()])
+        outcome = zip(part["status"].to_pylist(), part["failure_reason"].to_pylist(), strict=True)
+        failed = np.array([status != "ok" and reason != HIDDEN for status, reason in outcome])
         gross = np.array(part["gross_failure"].to_pylist())
         normalised = numbers(part, *(f"{component}_normalised" for component in COMPONENTS))
         found.append(Series(name, part["frame_id"].to_numpy(), errors, normalised, failed, gross))

@@ -29,7 +29,8 @@ class PointErrors:
     along_x: Array  # (f, n) along the image of the board's x, px; NaN for the circle
     theta_deg: Array  # (f, n) true angle from the optical axis
     side_px: Array  # (f, n) side of the local square; NaN for the circle
-    in_image: Mask  # (f, n)
+    in_image: Mask  # (f, n) whether a point is visible in the picture
+    made_up: Mask  # (f, n) found, though it is not visible; it has no error
     status: NDArray[np.str_]  # (f, n)
 
 
@@ -41,6 +42,8 @@ def point_errors(dataset: Dataset, frames: list[dict[str, Any]]) -> list[PointEr
     true = np.stack([points_by_frame(truth, target)[i] for i in ids])
     theta = numbers(truth, "theta_deg").reshape(-1, n)
     inside = truth["in_image"].to_numpy(zero_copy_only=False).reshape(-1, n)
+    visible = np.array([seen is not False for seen in truth["visible"].to_pylist()]).reshape(-1, n)
+    inside &= visible
     centre = np.array([[frame["cx_px"], frame["cy_px"]] for frame in frames])
     radius = true - centre[:, None]
     radius /= np.maximum(np.linalg.norm(radius, axis=-1, keepdims=True), 1e-9)
@@ -51,9 +54,13 @@ def point_errors(dataset: Dataset, frames: list[dict[str, Any]]) -> list[PointEr
         error = np.stack([points_by_frame(rows, target)[i] for i in ids]) - true
         covariance = np.stack([covariances_by_frame(rows, target)[i] for i in ids])
         status = rows["status"].to_numpy(zero_copy_only=False).astype(str).reshape(-1, n)
+        made_up = np.isfinite(error[..., 0]) & ~visible
+        error[made_up] = np.nan
         radial, along_x = np.sum(error * radius, axis=-1), np.sum(error * along, axis=-1)
         errors.append(
-            PointErrors(detector, error, _whitened(error, covariance), radial, along_x, theta, side, inside, status)
+            PointErrors(
+                detector, error, _whitened(error, covariance), radial, along_x, theta, side, inside, made_up, status
+            )
         )
     return errors
 
@@ -67,10 +74,12 @@ def tilt_rows(errors: list[PointErrors], frames: list[dict[str, Any]]) -> list[d
     for item in errors:
         for name in dict.fromkeys(camera.tolist()):
             for label, band in bands:
-                mask = (camera == name) & band
-                if np.any(mask):
+                chosen = (camera == name) & band
+                mask = chosen & item.in_image.any(axis=1)
+                made_up = int(item.made_up[chosen].sum())
+                if np.any(mask) or made_up:
                     found = np.isfinite(item.error[mask, :-1, 0]).any(axis=1)
-                    counts = {"frames": int(mask.sum()), "boards": int(found.sum())}
+                    counts = {"frames": int(mask.sum()), "boards": int(found.sum()), "made_up": made_up}
                     rows.append(
                         {"detector": item.detector, "camera": name, "tilt": label, **counts, **_row(item, mask)}
                     )

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import asdict, dataclass
 
 import numpy as np
 import pyarrow as pa
@@ -13,27 +14,31 @@ from datasets.errors import UserError
 from datasets.plan import Frame, frames_of_shard, shard_count
 from datasets.recipe.model import Recipe
 from datasets.rows import pose_columns, table
-from datasets.schema import FRAMES, KEYPOINTS
+from datasets.schema import FRAMES, KEYPOINTS, WORLD_PREFIX
 from datasets.store.dataset import Dataset
 from datasets.store.images import encode_png
 from datasets.store.linear_images import LinearImageError, are_kept, linear_key, linear_path, read_linear, write_linear
+from datasets.store.pixel_truth import truth_path, write_truth
 from datasets.store.refusals import refused
-from eposit.arrays import Array
+from eposit.arrays import Array, Mask
 from eposit.pose import tilt_rad
 from pipelines.engines.background import overlapped
-from render.frame import LinearImage, render_frame
+from render.frame import LinearImage, render_world, truth_of
+from render.pathtraced.picture import Viewpoint
 from render.sensor.develop import FrameContext, develop
 from render.targets.image_region import Region
+from render.truth.pixels import PixelTruth
 
 
 def is_done(dataset: Dataset, index: int) -> bool:
-    """Whether both tables of a shard are there, and its masters if they are kept."""
+    """Whether both tables of a shard are there, its masters if they are kept, and its truth if it is asked."""
     count = shard_count(dataset.recipe)
     if not all(dataset.is_done(dataset.shard_path(name, index, count)) for name in ("frames", "keypoints")):
         return False
-    return not are_kept(dataset.root) or all(
-        (dataset.root / linear_path(frame)).is_file() for frame in frames_of_shard(dataset.recipe, index)
-    )
+    files = [linear_path] if are_kept(dataset.root) else []
+    files += [truth_path] if dataset.recipe.outputs.aovs else []
+    chosen = frames_of_shard(dataset.recipe, index)
+    return all((dataset.root / path_of(frame)).is_file() for path_of in files for frame in chosen)
 
 
 def run_shard(dataset: Dataset, index: int, advance: Callable[[], None] = lambda: None) -> None:
@@ -43,14 +48,42 @@ def run_shard(dataset: Dataset, index: int, advance: Callable[[], None] = lambda
     """
     recipe = dataset.recipe
     count, chosen = shard_count(recipe), frames_of_shard(recipe, index)
-    makers = (functools.partial(_finish, dataset, frame, *_light(dataset, frame)) for frame in chosen)
-    rows = list(overlapped(makers, advance))
-    truth = pa.concat_tables(_keypoints(recipe, frame) for frame in chosen)
+    visible: list[Mask | None] = []
+    rows = list(overlapped(_makers(dataset, chosen, visible), advance))
+    truth = pa.concat_tables(_keypoints(recipe, frame, seen) for frame, seen in zip(chosen, visible, strict=True))
     dataset.write_shard(dataset.shard_path("keypoints", index, count), truth)
     dataset.write_shard(dataset.shard_path("frames", index, count), pa.Table.from_pylist(rows, schema=FRAMES))
     if not are_kept(dataset.root):
         for frame in chosen:  # of another dataset, put there by `--reuse`
             (dataset.root / linear_path(frame)).unlink(missing_ok=True)
+
+
+def _makers(
+    dataset: Dataset, chosen: Iterable[Frame], visible: list[Mask | None]
+) -> Iterator[Callable[[], dict[str, object]]]:
+    """What finishes each frame once its rays are traced. visible: gets which of each frame's points are."""
+    for frame in chosen:
+        light, is_new = _light(dataset, frame)
+        traced = _traced(dataset.recipe, frame)
+        visible.append(traced.visible)
+        yield functools.partial(_finish, dataset, frame, light, is_new, traced.pixels)
+
+
+@dataclass(frozen=True, slots=True)
+class _Traced:
+    """Truth by rays, None where the recipe needs none."""
+
+    visible: Mask | None = None
+    pixels: PixelTruth | None = None
+
+
+def _traced(recipe: Recipe, frame: Frame) -> _Traced:
+    is_world = recipe.world.method != "closed"
+    if not is_world and not recipe.outputs.aovs:
+        return _Traced()
+    camera, pose = frame.camera.true_camera(), frame.cam_from_obj
+    found = truth_of(recipe.world, frame.world, recipe.target, recipe.light, camera, pose)
+    return _Traced(found.visible() if is_world else None, found.pixels() if recipe.outputs.aovs else None)
 
 
 def _light(dataset: Dataset, frame: Frame) -> tuple[LinearImage, bool]:
@@ -62,9 +95,10 @@ def _light(dataset: Dataset, frame: Frame) -> tuple[LinearImage, bool]:
 
 
 def _rendered(recipe: Recipe, frame: Frame) -> LinearImage:
-    camera, samples = frame.camera.true_camera(), recipe.sample_count()
+    view = Viewpoint(frame.camera.true_camera(), frame.cam_from_obj, frame.render_seed)
+    scenery = recipe.world, frame.world, recipe.target, recipe.light
     try:
-        return render_frame(recipe.target, recipe.light, camera, frame.cam_from_obj, samples=samples)
+        return render_world(*scenery, view, samples=recipe.sample_count(), in_colour=recipe.outputs.colour)
     except ValueError as error:
         raise UserError(f"frame {frame.frame_id}: {error}") from error
 
@@ -76,7 +110,7 @@ def _developed(recipe: Recipe, frame: Frame, linear: LinearImage) -> NDArray[np.
 
 
 def picture(recipe: Recipe, frame: Frame) -> NDArray[np.uint8]:
-    """(height, width) grey values of a frame, rendered anew.
+    """(height, width) grey values of a frame, or (height, width, 3) RGB, rendered anew.
 
     Raises:
         UserError: it cannot be rendered.
@@ -84,19 +118,31 @@ def picture(recipe: Recipe, frame: Frame) -> NDArray[np.uint8]:
     return _developed(recipe, frame, _rendered(recipe, frame))
 
 
-def _finish(dataset: Dataset, frame: Frame, linear: LinearImage, is_new: bool) -> dict[str, object]:
-    """Write the linear image if it is new, develop it, and make the frame's row."""
+def _finish(
+    dataset: Dataset, frame: Frame, linear: LinearImage, is_new: bool, truth: PixelTruth | None
+) -> dict[str, object]:
+    """Write the linear image if it is new and the truth if there is any, develop, and make the frame's row."""
     recipe, spec = dataset.recipe, frame.camera
-    camera, relative = spec.true_camera(), linear_path(frame)
-    if is_new and are_kept(dataset.root):
-        try:
-            write_linear(linear, camera, dataset.root / relative, linear_key(recipe, frame))
-        except OSError as error:
-            raise refused(dataset.root / relative, error) from error
+    path = dataset.root / linear_path(frame)
+    try:
+        if is_new and are_kept(dataset.root):
+            write_linear(linear, spec.true_camera(), path, linear_key(recipe, frame))
+        if truth is not None:
+            path = dataset.root / truth_path(frame)
+            write_truth(truth, recipe.outputs.aovs, path)
+    except OSError as error:
+        raise refused(path, error) from error
     image = _developed(recipe, frame, linear)
+    return _row(recipe, frame, linear.region, image)
+
+
+def _row(recipe: Recipe, frame: Frame, region: Region, image: NDArray[np.uint8]) -> dict[str, object]:
+    """The frame's row of `frames`."""
+    spec = frame.camera
     coefficients = np.zeros(4)
     coefficients[: len(spec.coefficients)] = spec.coefficients
-    region = dict(zip((f"region_{a}_px" for a in Region._fields), linear.region, strict=True))
+    has_world = recipe.world.method != "closed"
+    drawn = {f"{WORLD_PREFIX}{name}": value if has_world else None for name, value in asdict(frame.world).items()}
     pose = {
         name: values[0] for name, values in pose_columns(frame.cam_from_obj.R[None], frame.cam_from_obj.t[None]).items()
     }
@@ -114,10 +160,12 @@ def _finish(dataset: Dataset, frame: Frame, linear: LinearImage, is_new: bool) -
         "tilt_deg": float(np.degrees(tilt_rad(frame.cam_from_obj.R))),
         "width_px": spec.width,
         "height_px": spec.height,
-        **region,
+        **dict(zip((f"region_{a}_px" for a in Region._fields), region, strict=True)),
         "render_seed": frame.render_seed,
         "sensor_seed": frame.sensor_seed,
-        "master": relative,
+        "master": linear_path(frame),
+        "truth": truth_path(frame) if recipe.outputs.aovs else None,
+        **drawn,
     }
 
 
@@ -126,7 +174,7 @@ def true_points(recipe: Recipe, frame: Frame) -> Array:
     return frame.camera.true_camera().project(frame.cam_from_obj.apply(recipe.target.points))
 
 
-def _keypoints(recipe: Recipe, frame: Frame) -> pa.Table:
+def _keypoints(recipe: Recipe, frame: Frame, visible: Mask | None) -> pa.Table:
     target, camera = recipe.target, frame.camera.true_camera()
     points, pixels = target.points, true_points(recipe, frame)
     in_cam = frame.cam_from_obj.apply(points)
@@ -144,6 +192,7 @@ def _keypoints(recipe: Recipe, frame: Frame) -> pa.Table:
             "y_outline_px": outline[:, 1],
             "theta_deg": np.degrees(np.arctan2(np.hypot(in_cam[:, 0], in_cam[:, 1]), in_cam[:, 2])),
             "in_image": camera.contains(pixels),
+            "visible": np.full(len(points), None) if visible is None else visible,
         },
     )
 

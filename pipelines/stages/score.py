@@ -14,7 +14,7 @@ from datasets.store.dataset import Dataset
 from eposit import Pose, Status
 from eposit.arrays import Array, Mask
 from eposit.pose import euler_error_rad, rotation_error_rad, rotation_error_vector
-from pipelines.stages.failures import failure_reasons
+from pipelines.stages.failures import HIDDEN, failure_reasons, is_hidden
 from render.targets import Target
 
 KEY = ("frame_id", "solver", "point_source", "assumed_camera", "point_set", "noise_draw", "status")
@@ -64,7 +64,12 @@ def run_shard(dataset: Dataset, estimates: Path) -> None:
     euler = np.degrees(euler_error_rad(found.R, true.R))
     failed = rows["status"].to_numpy(zero_copy_only=False) != Status.OK
     columns = {name: rows[name] for name in KEY}
-    columns["failure_reason"] = failure_reasons(dataset, estimates, rows)
+    hidden = is_hidden(dataset, estimates, rows)
+    reasons = failure_reasons(dataset, estimates, rows)
+    columns["failure_reason"] = [
+        HIDDEN if no_pose and unseen else reason
+        for reason, no_pose, unseen in zip(reasons, failed, hidden, strict=True)
+    ]
     scores = {
         **_places(dataset.recipe.target, true),
         "tilt_deg": truth["tilt_deg"],
@@ -73,7 +78,8 @@ def run_shard(dataset: Dataset, estimates: Path) -> None:
         **{f"t{axis}_error_mm": t_error[:, i] for i, axis in enumerate("xyz")},
         "t_error_relative": np.linalg.norm(t_error, axis=1) / np.linalg.norm(true.t, axis=1),
         "reprojection_rmse_px": rows["reprojection_rmse_px"],
-        "gross_failure": is_gross_failure(failed, found.t, true.t),
+        # No pose of a target that cannot be seen is right; one is made up.
+        "gross_failure": np.where(hidden, ~failed, is_gross_failure(failed, found.t, true.t)),
         **_normalised(rows, rotation_error_vector(found.R, true.R), t_error),
     }
     arrays = {

@@ -29,6 +29,7 @@ from render.targets.image_region import Region
 
 SENSOR = "eposit_fisheye"
 HALF_PIXEL = 0.5
+CROP = ("offset_x", "offset_y", "width", "height")  # of a film, in the order of a Region
 
 
 def sensor_dict(camera: Camera, cam_from_obj: Pose, region: Region, samples: int) -> dict[str, Any]:
@@ -38,6 +39,24 @@ def sensor_dict(camera: Camera, cam_from_obj: Pose, region: Region, samples: int
     Raises:
         BackendError: Mitsuba cannot run here.
     """
+    crop = {f"crop_{name}": value for name, value in zip(CROP, region, strict=True)}
+    film = _film(camera.width, camera.height, "luminance_alpha") | crop
+    return _description(camera, cam_from_obj, film, samples, np.eye(4))
+
+
+def tile_sensor(camera: Camera, cam_from_obj: Pose, tile: Region, samples: int, world_from_obj: Array) -> Any:
+    """Mitsuba's sensor for a tile of the picture, with a film of the tile's size in RGBA and no crop.
+
+    world_from_obj: (4, 4) from the object frame, mm, to the scene's frame and units.
+    """
+    shifted = camera.replace(cx=camera.cx - tile.x, cy=camera.cy - tile.y, width=tile.width, height=tile.height)
+    film = _film(tile.width, tile.height, "rgba")
+    return backend.load().load_dict(_description(shifted, cam_from_obj, film, samples, world_from_obj))
+
+
+def _description(
+    camera: Camera, cam_from_obj: Pose, film: dict[str, Any], samples: int, world_from_obj: Array
+) -> dict[str, Any]:
     mi = backend.load()
     register_sensor()
     obj_from_cam = cam_from_obj.inverse()
@@ -48,20 +67,20 @@ def sensor_dict(camera: Camera, cam_from_obj: Pose, region: Region, samples: int
         "lens": camera.lens,
         **{name: getattr(camera, name) for name in ("fx", "fy", "cx", "cy")},
         **{f"k{i}": k for i, k in enumerate(camera.coefficients, 1)},
-        "to_world": mi.ScalarTransform4f(to_world),
-        "film": {
-            "type": "hdrfilm",
-            "width": camera.width,
-            "height": camera.height,
-            "crop_offset_x": region.x,
-            "crop_offset_y": region.y,
-            "crop_width": region.width,
-            "crop_height": region.height,
-            "pixel_format": "luminance_alpha",
-            "component_format": "float32",
-            "rfilter": {"type": "box"},
-        },
+        "to_world": mi.ScalarTransform4f(world_from_obj @ to_world),
+        "film": film,
         "sampler": {"type": "multijitter", "sample_count": samples},
+    }
+
+
+def _film(width: int, height: int, pixel_format: str) -> dict[str, Any]:
+    return {
+        "type": "hdrfilm",
+        "width": width,
+        "height": height,
+        "pixel_format": pixel_format,
+        "component_format": "float32",
+        "rfilter": {"type": "box"},
     }
 
 

@@ -39,7 +39,9 @@ class FrameContext:
 
 
 def develop(radiance: Image, model: SensorModel, frame: FrameContext | None = None) -> NDArray[np.uint8]:
-    """(height, width) linear radiance to 8-bit grey values of the same size.
+    """(height, width) linear radiance to 8-bit grey values of the same size; (height, width, 3) to RGB.
+
+    Colours fall and spread alike, and each has noise of its own.
 
     frame: for models with noise, motion or uneven light.
 
@@ -49,24 +51,32 @@ def develop(radiance: Image, model: SensorModel, frame: FrameContext | None = No
     bits = None if frame is None else np.random.SFC64(frame.seed)
     if bits is None and model.needs_frame:
         raise ValueError("the sensor model has noise, motion or uneven light; give the frame as `frame`")
-    light = _point_spread(_uneven_light(radiance, model, bits), model)
-    if frame is not None and model.exposure_s > 0.0:
-        exposure = Exposure(frame.target, frame.camera, frame.cam_from_obj, frame.rate, model.exposure_s)
-        spread_px = model.defocus_radius_px + PSF_REACH_SIGMA * model.psf_sigma_px
-        light = motion_blurred(light, exposure, frame.region, spread_px)
+    direction = 0.0 if bits is None else 2.0 * np.pi * int(bits.random_raw()) / 2.0**64
+    planes = [radiance] if radiance.ndim == 2 else [np.ascontiguousarray(radiance[..., i]) for i in range(3)]
+    falling = [_on_the_sensor(plane, model, frame, direction) for plane in planes]
+    light = falling[0] if radiance.ndim == 2 else np.stack(falling, axis=-1)
     linear = light * np.float32(model.exposure)
     if bits is not None and model.full_well_e > 0.0:
         linear += electron_noise(linear, model.full_well_e, model.read_noise_e, bits)
     return _digitise(linear, model)
 
 
-def _uneven_light(radiance: Image, model: SensorModel, bits: np.random.SFC64 | None) -> Image:
+def _on_the_sensor(radiance: Image, model: SensorModel, frame: FrameContext | None, direction: float) -> Image:
+    """Light as the lens and the motion leave it. direction: in which it falls unevenly, rad."""
+    light = _point_spread(_uneven_light(radiance, model, direction), model)
+    if frame is None or model.exposure_s == 0.0:
+        return light
+    exposure = Exposure(frame.target, frame.camera, frame.cam_from_obj, frame.rate, model.exposure_s)
+    spread_px = model.defocus_radius_px + PSF_REACH_SIGMA * model.psf_sigma_px
+    return motion_blurred(light, exposure, frame.region, spread_px)
+
+
+def _uneven_light(radiance: Image, model: SensorModel, direction: float) -> Image:
     """Light as it falls, unevenly, and as the lens lets it through, less towards the corners.
 
     The uneven light is a plane over the picture, 1 in its middle and 1 +- uneven in the corners that it falls towards.
     """
     size = radiance.shape[::-1]
-    direction = 0.0 if bits is None else 2.0 * np.pi * int(bits.random_raw()) / 2.0**64
     if model.uneven == 0.0:
         return radiance * vignetting_gain(*size, model.vignetting) if model.vignetting > 0.0 else radiance
     x, y = normalised_axes(*size)

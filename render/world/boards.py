@@ -42,9 +42,7 @@ def board_shape(target: Chessboard, coat: Coat) -> Shape:
     }
     half_x, half_y, centre = np.zeros(3), np.zeros(3), np.zeros(3)
     half_x[0], half_y[1], centre[:2] = (x1 - x0) / 2.0, (y1 - y0) / 2.0, ((x0 + x1) / 2.0, (y0 + y1) / 2.0)
-    return _facing_camera(
-        "rectangle", frame_matrix(half_x, half_y, np.array([0.0, 0.0, 1.0]), centre), coat(reflectance)
-    )
+    return _facing_camera("rectangle", frame_matrix(half_x, half_y, -FRONT, centre), coat(reflectance))
 
 
 def circle_shape(target: Chessboard) -> Shape:

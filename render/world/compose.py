@@ -17,13 +17,15 @@ from render.targets.chessboard import Chessboard
 from render.world.boards import card_shapes, stand_shapes, target_shapes
 from render.world.description import World
 from render.world.draw import WorldDraw
+from render.world.files import require_unchanged
 from render.world.materials import Material, surface
 from render.world.open_air import environment, sky
 from render.world.room import room
+from render.world.scene_file import SceneFileError
 from render.world.shapes import Objects
 from render.world.studio import studio
 from render.world.things import clutter, occluders, other_boards
-from render.world.user_scene import user_objects, world_from_obj
+from render.world.user_scene import first_line, user_scene, world_from_obj
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,7 @@ class Composition:
     objects: Objects  # name to Mitsuba description or object, in the scene's frame; without an integrator
     world_from_obj: Array  # (4, 4) from the object frame, mm, to the scene's frame and units; else the identity
     shows_emitters: bool  # whether the camera sees lamps, sky and environment
+    has_medium: bool = False  # whether there is fog or the like
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,9 +56,10 @@ def compose(world: World, draw: WorldDraw, target: Chessboard, light: Light, par
     of one does not move the others.
 
     Raises:
-        SceneFileError: the user's scene cannot be used.
+        SceneFileError: the user's file cannot be used, or has changed.
     """
     objects = _surroundings(world, draw, target, light)
+    has_medium = world.surround == "scene" and user_scene(Path(world.file)).has_medium
     objects |= clutter(draw.clutter, target, _rng(draw, 1))
     objects |= other_boards(draw.boards, target, _rng(draw, 2))
     if parts.has_occluders:
@@ -67,10 +71,9 @@ def compose(world: World, draw: WorldDraw, target: Chessboard, light: Light, par
     if world.surround in ("room", "sky") and draw.has_target:
         objects |= stand_shapes(target, world.floor_mm)
     matrix = world_from_obj(world, target) if world.surround == "scene" else np.eye(4)
-    return Composition(_in_scene(objects, matrix), matrix, world.surround != "studio")
+    return Composition(_in_scene(objects, matrix), matrix, world.surround != "studio", has_medium)
 
 
-@functools.lru_cache(maxsize=2)
 def load_scene(
     world: World, draw: WorldDraw, target: Chessboard, light: Light, parts: Parts = WHOLE
 ) -> tuple[DeviceScene, Composition]:
@@ -80,12 +83,20 @@ def load_scene(
         SceneFileError: the user's scene cannot be used.
     """
     composition = compose(world, draw, target, light, parts)
-    return backend.load().load_dict({"type": "scene", **composition.objects}), composition
+    return _loaded(composition.objects), composition
 
 
 def load_objects(objects: Objects) -> DeviceScene:
     """A scene of objects in the object frame."""
-    return backend.load().load_dict({"type": "scene", **_in_scene(objects, np.eye(4))})
+    return _loaded(_in_scene(objects, np.eye(4)))
+
+
+def _loaded(objects: Objects) -> DeviceScene:
+    try:
+        # Not optimised: Mitsuba would merge meshes, and each object has an id of its own.
+        return backend.load().load_dict({"type": "scene", **objects}, optimize=False)
+    except RuntimeError as error:  # of a file that a plugin cannot read, such as an environment map
+        raise SceneFileError(f"Mitsuba cannot load the world: {first_line(error)}; mend the file") from None
 
 
 def _coat(world: World, draw: WorldDraw, reflectance: Material) -> Material:
@@ -99,9 +110,10 @@ def _surroundings(world: World, draw: WorldDraw, target: Chessboard, light: Ligh
         return room(world, draw, target, _rng(draw, 0))
     if world.surround == "sky":
         return sky(world, draw, target, _rng(draw, 0))
+    require_unchanged(Path(world.file), world.file_sha256)
     if world.surround == "envmap":
         return environment(world, draw)
-    return dict(user_objects(Path(world.file)))
+    return dict(user_scene(Path(world.file)).objects)
 
 
 def _rng(draw: WorldDraw, group: int) -> np.random.Generator:

@@ -42,12 +42,12 @@ def random_colour(rng: np.random.Generator, low: float = 0.08, high: float = 0.7
     return float(red), float(green), float(blue)
 
 
-def random_material(rng: np.random.Generator) -> Material:
-    """Matt, plastic or metal in a random colour."""
-    colour, kind, roughness = random_colour(rng), rng.random(), float(rng.uniform(0.08, 0.4))
-    if kind < 0.6:
+def material_of(number: int, rng: np.random.Generator) -> Material:
+    """Of five things three are matt, one plastic and one metal, in random colours."""
+    colour, kind, roughness = random_colour(rng), number % 5, float(rng.uniform(0.08, 0.4))
+    if kind < 3:
         return diffuse(colour)
-    if kind < 0.85:
+    if kind == 3:
         return {
             "type": "roughplastic",
             "diffuse_reflectance": {"type": "rgb", "value": list(colour)},
@@ -77,7 +77,7 @@ def bricks(rng: np.random.Generator) -> Texture:
     """Courses of bricks, each a little different, with mortar between."""
     rows, columns, mortar = 8, 4, 3
     height, width = SIDE // rows, SIDE // columns
-    base = np.array([0.38, 0.15, 0.09]) * rng.uniform(0.8, 1.3)
+    base = np.array([0.42, 0.24, 0.17]) * rng.uniform(0.8, 1.3)
     texture = np.empty((SIDE, SIDE, 3))
     for row in range(rows):
         shades = rng.uniform(0.65, 1.35, (columns, 1)) * base

@@ -136,8 +136,7 @@ class _Reader:
             found = (folder / name).resolve()
             if not found.is_relative_to(self.folder):
                 raise SceneFileError(
-                    f"the scene names {name!r}, which lies outside its folder {self.folder}; copy what it needs into the "
-                    "folder"
+                    f"the scene names {name!r}, which lies outside its folder {self.folder}; copy it into the folder"
                 )
             if found.exists():
                 self.files += [found] if found.is_file() else []

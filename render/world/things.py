@@ -1,4 +1,7 @@
-"""Things around and in front of the target: clutter, occluders, other chessboards."""
+"""Things around and in front of the target: clutter, occluders, other chessboards.
+
+What kind a thing is follows from its number, not from random numbers: Dr.Jit compiles a kernel for each set of kinds.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from eposit.arrays import Array
 from eposit.pose import rotation_from_vector
 from render.targets.chessboard import Chessboard
 from render.world.boards import other_board
-from render.world.materials import random_material
+from render.world.materials import material_of
 from render.world.shapes import FRONT, RIGHT, UP, Objects, Shape, ball, box, pole
 
 GAP_MM = 150.0  # between the target's border and what stands beside it
@@ -23,7 +26,7 @@ def clutter(count: int, target: Chessboard, rng: np.random.Generator) -> Objects
     found: Objects = {}
     for i in range(count):
         size, at = rng.uniform(60.0, 400.0), _beside(target, rng)
-        found[f"clutter_{i}"] = _thing(at, size, rng)
+        found[f"clutter_{i}"] = _thing(i, at, size, rng)
     return found
 
 
@@ -34,13 +37,13 @@ def occluders(count: int, target: Chessboard, rng: np.random.Generator) -> Objec
     for i in range(count):
         before, radius = rng.uniform(*BEFORE_MM), rng.uniform(THIN_MM, THICK_MM)
         at = np.array([rng.uniform(x0, x1), rng.uniform(y0, y1), 0.0]) + before * FRONT
-        if rng.random() < 0.5:
+        if i % 2 == 0:
             tilt = rng.normal(0.0, 0.25)
             along = np.cos(tilt) * UP + np.sin(tilt) * RIGHT
             long = 0.7 * np.hypot(x1 - x0, y1 - y0)
-            found[f"occluder_{i}"] = pole(at - long * along, at + long * along, radius, random_material(rng))
+            found[f"occluder_{i}"] = pole(at - long * along, at + long * along, radius, material_of(i, rng))
         else:
-            found[f"occluder_{i}"] = ball(at, 2.0 * radius, random_material(rng))
+            found[f"occluder_{i}"] = ball(at, 2.0 * radius, material_of(i, rng))
     return found
 
 
@@ -72,12 +75,13 @@ def _beside(target: Chessboard, rng: np.random.Generator) -> Array:
     return target.board_centre + np.array([sign * offset[0], sign * offset[1], depth])
 
 
-def _thing(at: Array, size: float, rng: np.random.Generator) -> Shape:
-    kind, turn, material = rng.random(), rng.uniform(0.0, np.pi), random_material(rng)
-    if kind < 0.5:
+def _thing(number: int, at: Array, size: float, rng: np.random.Generator) -> Shape:
+    """Of seven things four are boxes, two balls and one a rod."""
+    kind, turn, material = number % 7, rng.uniform(0.0, np.pi), material_of(number, rng)
+    if kind < 4:
         width, height, depth = rng.uniform(0.3, 1.0, 3) * size
         return box(at, (width, height, depth), turn, material)
-    if kind < 0.8:
+    if kind < 6:
         return ball(at, 0.4 * size, material)
     direction = rng.normal(0.0, 1.0, 3)
     half = size * direction / np.linalg.norm(direction)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,35 +12,42 @@ from eposit.arrays import Array
 from render import backend
 from render.targets.chessboard import Chessboard
 from render.world.description import World
-from render.world.scene_file import SceneFile, SceneFileError, read_scene_file
+from render.world.scene_file import SceneFileError, read_scene_file
 from render.world.shapes import Objects
 
 
+@dataclass(frozen=True)
+class UserScene:
+    """The shapes and emitters of a scene file, loaded; its integrator and sensors are left out."""
+
+    objects: Objects
+    has_medium: bool  # whether there is fog or the like, which needs another path tracer
+
+
 @functools.lru_cache(maxsize=2)
-def user_objects(path: Path) -> Objects:
-    """The shapes and emitters of a scene file, loaded; its integrator and sensors are left out.
+def user_scene(path: Path) -> UserScene:
+    """Load a scene file.
 
     Raises:
         SceneFileError: the file cannot be used; Mitsuba does not know a plugin or refuses a value.
     """
     mi, scene_file = backend.load(), read_scene_file(path)
     try:
-        scene = mi.load_string(scene_file.text)
+        scene = mi.load_string(scene_file.text, optimize=False)
     except Exception as error:  # Mitsuba raises whatever a plugin does
-        raise SceneFileError(f"Mitsuba cannot load {path}: {_first_line(error)}; mend the scene") from None
+        raise SceneFileError(f"Mitsuba cannot load {path}: {first_line(error)}; mend the scene") from None
     if not isinstance(scene, mi.Scene):
         raise SceneFileError(f"{path} is not a Mitsuba scene; give a file with <scene> and shapes in it")
-    objects: Objects = {f"scene_{i}": shape for i, shape in enumerate(scene.shapes())}
+    objects: Objects = {}
+    for i, shape in enumerate(scene.shapes()):
+        name = f"scene_{i}_{shape.id()}".replace(".", "_")  # Mitsuba takes no dots in a name
+        shape.set_id(name)
+        objects[name] = shape
     apart = [light for light in scene.emitters() if not mi.has_flag(light.flags(), mi.EmitterFlags.Surface)]
     objects |= {f"scene_light_{i}": light for i, light in enumerate(apart)}
     if not scene.emitters():
         raise SceneFileError(f"{path} has no light; add an emitter to the scene")
-    return objects
-
-
-def has_medium(scene_file: SceneFile) -> bool:
-    """Whether a scene has a participating medium, which needs another path tracer."""
-    return "<medium" in scene_file.text
+    return UserScene(objects, "<medium" in scene_file.text)
 
 
 def world_from_obj(world: World, target: Chessboard) -> Array:
@@ -54,6 +62,7 @@ def world_from_obj(world: World, target: Chessboard) -> Array:
     return matrix
 
 
-def _first_line(error: Exception) -> str:
+def first_line(error: Exception) -> str:
+    """The first line of what Mitsuba says, to stand in a sentence."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     return (lines[0] if lines else type(error).__name__).rstrip(".")
