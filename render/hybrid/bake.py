@@ -8,7 +8,7 @@ smoothed by itself, and the direct light is computed again on a finer grid where
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any  # Any: Mitsuba's objects, whose types depend on its variant
 
 import numpy as np
@@ -19,14 +19,15 @@ from render import backend
 from render.device import DeviceFloat, DeviceScene, DeviceSpectrum
 from render.hybrid.keyed_sampler import keyed_sampler, lattice_numbers
 from render.hybrid.outgoing import NUMBERS, direct_light, rest_of_light
-from render.hybrid.smooth import NARROW, WIDTHS, noise, smoothed
 from render.hybrid.placement import Placement
+from render.hybrid.smooth import NARROW, WIDTHS, noise, smoothed
 from render.hybrid.texels import Grid, coarse_grid, disc_grid, fine_grid, magnified, paste
 from render.targets.chessboard import Chessboard
 
 REST_SHARE = 4  # a texel has so many times fewer rays for soft light than for direct light
 MAX_RAYS = 1 << 22  # in flight
 EDGE_SIGMA, EDGE_SHARE = 6.0, 0.02  # a difference of direct light between texels that counts as a shadow's edge
+NEAR_SAMPLES = 2  # times as many rays around the raised circle, where averages over many texels would darken the board
 DISC_TEXELS = 8  # along each side of the square around the raised circle
 
 Estimator = Callable[[Any, list[DeviceFloat], Any], DeviceSpectrum]
@@ -61,8 +62,8 @@ class Baker:
         self._refine(board, fine, edges > 0.0)
         board += magnified(_smooth(rest), coarse, fine)
         near, place = disc_grid(target)
-        direct, rest = self._both(near, 1)
-        paste(board, _smooth(direct, NARROW) + _smooth(rest, NARROW), place)
+        direct, rest = replace(self, samples=NEAR_SAMPLES * self.samples)._both(near, 1)
+        paste(board, direct.mean(axis=0) + _smooth(rest, NARROW), place)
         return BakedLight(*(part.astype(np.float32) for part in (board, edges, self._disc(target))))
 
     def _both(self, grid: Grid, number: int) -> list[Array]:
@@ -93,9 +94,7 @@ class Baker:
         ]
         return sum(halves).mean(axis=(0, 1))
 
-    def _light(
-        self, points: Array, step: tuple[float, float], light: Estimator, samples: int, purpose: int
-    ) -> Array:
+    def _light(self, points: Array, step: tuple[float, float], light: Estimator, samples: int, purpose: int) -> Array:
         """(2, n, 3) light at texels with centres (n, 3) and sides `step`, mm, by two independent halves of the rays."""
         half, found = max(1, samples // 2), []
         size = max(1, MAX_RAYS // (2 * half))

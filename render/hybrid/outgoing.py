@@ -26,6 +26,7 @@ def direct_light(scene: DeviceScene, surface: Any, material: Any, numbers: list[
     mi, dr = backend.load(), backend.jit()
     source, weight = scene.sample_emitter_direction(surface, mi.Point2f(numbers[0], numbers[1]), True)
     value, density = material.eval_pdf(mi.BSDFContext(), surface, surface.to_local(source.d))
+    density = dr.select(dr.isfinite(density), density, 0.0)  # NaN below the horizon of a plastic without gloss
     share = dr.select(source.delta, 1.0, _power_share(source.pdf, density))
     return dr.select(source.pdf > 0.0, value * weight * share, 0.0)
 

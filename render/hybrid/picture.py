@@ -51,13 +51,24 @@ class HybridScene:
     coat: Coat
     disc_radiance: NDArray[np.float32]  # (3,)
     rays: Rays
+    gain: float  # what radiance is multiplied with
+    has_surroundings: bool  # whether anything but the target may be seen
+
+    def frame(self, camera: Camera, cam_from_obj: Pose, seed: int) -> TracedFrame:
+        """The traced layers of one picture."""
+        return TracedFrame(self, RayCamera(camera, cam_from_obj), seed)
+
+    @property
+    def empty_radiance(self) -> float | None:
+        """Radiance of all that lies beyond the target, None where it has to be traced."""
+        return None if self.has_surroundings else self.traced.escaped
 
     def region(self, camera: Camera, cam_from_obj: Pose, region: Region, *, cells: int, seed: int) -> Colours:
         """Radiance of a region's pixels.
 
         cells: of a pixel that several edges cross, a square number. seed: of the frame, 32 bits.
         """
-        frame = _Frame(self, RayCamera(camera, cam_from_obj), seed)
+        frame = self.frame(camera, cam_from_obj, seed)
         wide = region.grown(BLOCKED_MARGIN, camera.width, camera.height)
         layers = self.closed.layers(camera, cam_from_obj, wide, cells)
         board = np.maximum(layers.filled - layers.disc, 0.0)
@@ -67,18 +78,19 @@ class HybridScene:
         picture += frame.gloss(wide, (board > 0.0) & ~hidden) * board[..., None]
         picture += frame.behind(wide, (beside > 0.0) & ~hidden) * beside[..., None]
         picture[hidden] = frame.front(wide, hidden)[hidden]
-        return picture[_within(region, wide)]
+        return np.ascontiguousarray(picture[_within(region, wide)]) * np.float32(self.gain)
 
     def surroundings(self, camera: Camera, cam_from_obj: Pose, region: Region, *, seed: int) -> Colours:
         """(camera.height, camera.width, 3) radiance of the whole picture but for a region, which holds zeros."""
         whole, coverage = Region.whole(camera.width, camera.height), lens_coverage(camera)
         chosen = coverage > 0.0
         chosen[region.pixels] = False
-        return _Frame(self, RayCamera(camera, cam_from_obj), seed).behind(whole, chosen) * coverage[..., None]
+        frame = self.frame(camera, cam_from_obj, seed)
+        return frame.behind(whole, chosen) * (np.float32(self.gain) * coverage)[..., None]
 
 
 @dataclass(frozen=True, slots=True)
-class _Frame:
+class TracedFrame:
     """One picture's traced layers. Each is (height, width, 3) of a region, zero where it was not asked for."""
 
     scene: HybridScene
@@ -86,6 +98,7 @@ class _Frame:
     seed: int
 
     def gloss(self, region: Region, chosen: Mask) -> Colours:
+        """The board's shiny layer, as if the board filled the pixels."""
         scene = self.scene
         if scene.coat.gloss is None:
             return np.zeros((*chosen.shape, 3), np.float32)
@@ -94,10 +107,12 @@ class _Frame:
         return _spread(scene.traced.gloss(scene.coat.gloss, scene.target.extent_mm, self.rays, pixels, key), chosen)
 
     def behind(self, region: Region, chosen: Mask) -> Colours:
+        """What is seen beside the target, as if it filled the pixels."""
         pixels, key = self._pixels(region, chosen), self._key(Purpose.BEHIND)
         return _spread(self.scene.traced.behind(self.rays, pixels, self.scene.rays.background, key), chosen)
 
     def front(self, region: Region, chosen: Mask) -> Colours:
+        """All that is seen, with the rays of what stands in front of the target."""
         pixels, key = self._pixels(region, chosen), self._key(Purpose.FRONT)
         return _spread(self.scene.traced.everything(self.rays, pixels, self.scene.rays.path, key), chosen)
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from eposit.arrays import Array
 
 WIDTHS = (1.0, 2.0, 4.0)  # standard deviations of the averages, in texels
-NARROW = WIDTHS[:1]  # where light bends so near to what is seen that a wide average would darken it unnoticed
+NARROW = WIDTHS[:1]
 SIGNIFICANT = 3.0  # standard errors by which an average may differ from finer ones
 NOISE_WIDTH = 1.5  # texels
 SUPPORT = 3  # of the nine texels around one that must differ, too: a stray bright path does so alone

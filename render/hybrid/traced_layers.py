@@ -49,7 +49,7 @@ class TracedScene:
         """Mean radiance of what pixels see beside the target; where no ray passes it, of what stands behind it."""
 
         def radiance(found: PixelRays) -> tuple[DeviceSpectrum, DeviceFloat]:
-            mi, dr = backend.load(), backend.jit()
+            dr = backend.jit()
             ray, missed = self._past_target(found)
             weight = dr.select(found.seen, dr.select(missed, 1.0, HIDDEN_WEIGHT), 0.0)
             return self._along(ray, found) * weight, weight
