@@ -17,6 +17,7 @@ import numpy as np
 from datasets.plan import Frame
 from datasets.recipe.model import Recipe
 from datasets.store.atomic import replace_atomically
+from datasets.store.linear_images import silent_library
 from render.hybrid.bake import BakedLight
 from render.hybrid.prepare import baked_light
 from render.world import WorldDraw
@@ -94,7 +95,7 @@ def _read(path: Path, key: str) -> BakedLight | None:
     if not path.is_file():
         return None
     try:
-        with OpenEXR.File(str(path)) as file:
+        with silent_library(), OpenEXR.File(str(path)) as file:
             header, channels = file.header(), file.channels()
             if header["key"] != key:
                 return None
