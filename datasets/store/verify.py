@@ -5,12 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from datasets.errors import UserError
-from datasets.plan import shard_count
+from datasets.plan import plan, shard_count
 from datasets.schema import TABLES
 from datasets.store.dataset import Dataset
 from datasets.store.digest import table_digest
 from datasets.store.linear_images import LinearImageError, are_kept, masters, read_linear
 from datasets.store.manifest import Entry, content_of, shard_entry
+from datasets.store.pixel_truth import truth_path
 from datasets.store.refusals import stage_of
 from datasets.store.shard_file import DIGEST_KEY
 
@@ -26,7 +27,7 @@ def verify(dataset: Dataset) -> tuple[str, list[str]]:
                 problems.append(problem)
             else:
                 sound.append(shard_entry(dataset.root, path))
-    problems += _missing(dataset) + _masters(dataset)
+    problems += _missing(dataset) + _masters(dataset) + _truth(dataset)
     return content_of(dataset.recipe.digest(), sound), problems
 
 
@@ -50,6 +51,13 @@ def _missing(dataset: Dataset) -> list[str]:
         for path in (dataset.shard_path(table, index, count) for index in range(count))
         if not path.is_file()
     ]
+
+
+def _truth(dataset: Dataset) -> list[str]:
+    if not dataset.recipe.outputs.aovs:
+        return []
+    paths = (dataset.root / truth_path(frame) for frame in plan(dataset.recipe))
+    return [f"{path} is missing; run the generate stage to make it" for path in paths if not path.is_file()]
 
 
 def _masters(dataset: Dataset) -> list[str]:

@@ -85,7 +85,10 @@ def _traced(recipe: Recipe, frame: Frame) -> _Traced:
     if not is_world and not recipe.outputs.aovs:
         return _Traced()
     camera, pose = frame.camera.true_camera(), frame.cam_from_obj
-    found = truth_of(recipe.world, frame.world, recipe.target, recipe.light, camera, pose)
+    try:
+        found = truth_of(recipe.world, frame.world, recipe.target, recipe.light, camera, pose)
+    except ValueError as error:
+        raise UserError(f"frame {frame.frame_id}: {error}") from error
     return _Traced(found.visible() if is_world else None, found.pixels() if recipe.outputs.aovs else None)
 
 

@@ -59,7 +59,7 @@ def compose(world: World, draw: WorldDraw, target: Chessboard, light: Light, par
         SceneFileError: the user's file cannot be used, or has changed.
     """
     objects = _surroundings(world, draw, target, light)
-    has_medium = world.surround == "scene" and user_scene(Path(world.file)).has_medium
+    has_medium = world.surround == "scene" and user_scene(Path(world.file), world.file_sha256).has_medium
     objects |= clutter(draw.clutter, target, _rng(draw, 1))
     objects |= other_boards(draw.boards, target, _rng(draw, 2))
     if parts.has_occluders:
@@ -113,7 +113,7 @@ def _surroundings(world: World, draw: WorldDraw, target: Chessboard, light: Ligh
     require_unchanged(Path(world.file), world.file_sha256)
     if world.surround == "envmap":
         return environment(world, draw)
-    return dict(user_scene(Path(world.file)).objects)
+    return dict(user_scene(Path(world.file), world.file_sha256).objects)
 
 
 def _rng(draw: WorldDraw, group: int) -> np.random.Generator:

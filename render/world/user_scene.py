@@ -25,8 +25,8 @@ class UserScene:
 
 
 @functools.lru_cache(maxsize=2)
-def user_scene(path: Path) -> UserScene:
-    """Load a scene file.
+def user_scene(path: Path, sha256: str) -> UserScene:
+    """Load a scene file. sha256: of what it is, so that another one in its place is not taken for it.
 
     Raises:
         SceneFileError: the file cannot be used; Mitsuba does not know a plugin or refuses a value.

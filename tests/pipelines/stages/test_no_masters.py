@@ -62,7 +62,7 @@ def test_it_has_nothing_to_reuse(place, bare, cli, tmp_path):
 def test_it_reuses_those_of_others_and_keeps_none(place, cli, content, tmp_path, monkeypatch):
     from pipelines.stages import generate
 
-    monkeypatch.setattr(generate, "render_frame", lambda *_, **__: pytest.fail("rendered again"))
+    monkeypatch.setattr(generate, "render_world", lambda *_, **__: pytest.fail("rendered again"))
     source = place.dataset(without=["detections", "estimates", "scores"])
     before = files(source)
     words = ("generate", place.recipe(), "--out", place.new(), "--reuse", source, "--no-masters")

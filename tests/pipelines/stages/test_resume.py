@@ -36,7 +36,7 @@ def no_rendering(monkeypatch):
     def refuse(*_, **__):
         raise AssertionError("rendered again")
 
-    monkeypatch.setattr(generate, "render_frame", refuse)
+    monkeypatch.setattr(generate, "render_world", refuse)
 
 
 def first(root, folder):
@@ -164,7 +164,7 @@ def test_a_noisy_regime_needs_no_rendering_and_has_the_same_bits_in_any_order(ti
     recipe, _ = copy
     noisy = tmp_path / "noisy"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(generate, "render_frame", lambda *_, **__: pytest.fail("rendered again"))
+        patch.setattr(generate, "render_world", lambda *_, **__: pytest.fail("rendered again"))
         done = cli("generate", recipe, "--out", noisy, "--regime", "harsh", "--reuse", tiny[1])
     assert done.code == 0
     assert "2 of 2 taken from" in done.out.replace("\n", " ")
