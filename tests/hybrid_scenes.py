@@ -26,7 +26,7 @@ DEPTH_MM = {"perspective": 2600.0}  # of the board's centre; elsewhere 1100 mm
 
 def world_of(scene: str, bake_samples: int) -> tuple[World, WorldDraw]:
     """One of `SCENES` with its only draw."""
-    world = World(method="hybrid", bake_samples=bake_samples, **SCENES[scene])
+    world = World(method="hybrid", bake_samples=bake_samples, background_samples=4, **SCENES[scene])
     return world, draw_world(world, np.random.default_rng(5))
 
 

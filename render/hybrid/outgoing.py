@@ -43,7 +43,7 @@ def rest_of_light(
     ray = mi.RayDifferential3f(surface.spawn_ray(surface.to_world(turn.wo)))
     hit = scene.ray_intersect(ray)
     source = hit.emitter(scene)
-    density = scene.pdf_emitter_direction(surface, mi.DirectionSample3f(scene, hit, surface), source != None)  # noqa: E711 (an array)
+    density = scene.pdf_emitter_direction(surface, mi.DirectionSample3f(scene, hit, surface))  # 0 without a source
     mirror = mi.has_flag(turn.sampled_type, mi.BSDFFlags.Delta)
     share = dr.select(mirror, 1.0, _power_share(turn.pdf, density))
     incoming, _, _ = path.sample(scene, sampler, ray, None, True)

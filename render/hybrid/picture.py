@@ -78,7 +78,7 @@ class HybridScene:
         picture += frame.gloss(wide, (board > 0.0) & ~hidden) * board[..., None]
         picture += frame.behind(wide, (beside > 0.0) & ~hidden) * beside[..., None]
         picture[hidden] = frame.front(wide, hidden)[hidden]
-        return np.ascontiguousarray(picture[_within(region, wide)]) * np.float32(self.gain)
+        return np.asarray(picture[_within(region, wide)] * np.float32(self.gain), np.float32)
 
     def surroundings(self, camera: Camera, cam_from_obj: Pose, region: Region, *, seed: int) -> Colours:
         """(camera.height, camera.width, 3) radiance of the whole picture but for a region, which holds zeros."""
@@ -86,7 +86,8 @@ class HybridScene:
         chosen = coverage > 0.0
         chosen[region.pixels] = False
         frame = self.frame(camera, cam_from_obj, seed)
-        return frame.behind(whole, chosen) * (np.float32(self.gain) * coverage)[..., None]
+        radiance = frame.behind(whole, chosen) * (np.float32(self.gain) * coverage)[..., None]
+        return np.asarray(radiance, np.float32)
 
 
 @dataclass(frozen=True, slots=True)

@@ -55,7 +55,7 @@ class TracedScene:
             return self._along(ray, found) * weight, weight
 
         total, weight = rays.mean_over_pixels(pixels, samples, seed, radiance)
-        return total / np.maximum(weight, np.float32(1e-12))[:, None]
+        return _weighted(total, weight)
 
     def _along(self, ray: Any, rays: PixelRays) -> DeviceSpectrum:
         """Radiance along rays of the object frame; none where the lens does not see."""
@@ -112,4 +112,9 @@ class TracedScene:
             return light * weight, weight
 
         total, weight = rays.mean_over_pixels(pixels, samples, seed, radiance, NUMBERS)
-        return total / np.maximum(weight, np.float32(1e-12))[:, None]
+        return _weighted(total, weight)
+
+
+def _weighted(total: Radiance, weight: NDArray[np.float32]) -> Radiance:
+    """Sums by the sums of their weights; zero where no ray counts."""
+    return np.asarray(total / np.maximum(weight, np.float32(1e-12))[:, None], np.float32)
