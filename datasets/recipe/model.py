@@ -93,6 +93,11 @@ class Recipe(BaseModel):
             raise ValueError(
                 f"four has {len(indices)} points, {len(set(indices))} of them different; give four different ones"
             )
+        if self.world.method == "hybrid" and not isinstance(self.target, Chessboard):
+            raise ValueError(
+                f"world method is 'hybrid', which bakes light for pattern chessboard only, and the target is "
+                f"{self.target.pattern!r}; set method to path or closed"
+            )
         return self
 
     def sample_count(self) -> int:
