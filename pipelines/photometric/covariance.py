@@ -5,8 +5,12 @@ the grid does not follow, dirt, texture and noise that the point spread has blur
 shows: each cell of the grid pulls at the pose with its own residuals, and the scatter of these pulls tells the
 variance, whatever the residuals in a cell have in common.
 
+A cell that says much of the pose bends it towards its own residuals, which then look smaller than they were; each pull
+is scaled by what its cell leaves to the others.
+
 Source:
-    White, Econometrica 48 (1980), 817: the sandwich covariance; Liang and Zeger, Biometrika 73 (1986), 13, of clusters.
+    White, Econometrica 48 (1980), 817: the sandwich covariance; Liang and Zeger, Biometrika 73 (1986), 13: of clusters;
+    Bell and McCaffrey, Survey Methodology 28 (2002), 169: the scale of a cluster's residuals.
 """
 
 from __future__ import annotations
@@ -16,17 +20,24 @@ import numpy as np
 from eposit.arrays import Array
 from pipelines.photometric.kernels import Sums
 from pipelines.photometric.light_grid import LightGrid
-from pipelines.photometric.normal_equations import Step, unknowns
+from pipelines.photometric.normal_equations import Step, symmetric, unknowns
+
+MOST_LEVERAGE = 0.9  # of a cell on a direction of the shape; with more there is nothing to compare it with
 
 
 def sandwich(sums: Sums, step: Step, grid: LightGrid) -> Array:
     """(7, 7) covariance of the shape, from cells of the grid as clusters. sums, step: of the last iteration."""
-    own = unknowns(grid)
-    pulls = sums.right + np.einsum("ck,ckj->cj", sums.light_right, step.light_of_shape[own])
-    pulls = pulls[np.any(sums.cross != 0.0, axis=(1, 2))]
-    count, shape = pulls.shape
-    moved = (pulls - pulls.mean(axis=0)) @ step.covariance
-    return moved.T @ moved * (count / max(count - shape, 1))
+    by_light = step.light_of_shape[unknowns(grid)]  # (cells, 12, 7)
+    to_light = np.swapaxes(by_light, 1, 2)
+    pulls = sums.right + np.einsum("ckj,ck->cj", by_light, sums.light_right)
+    mixed = to_light @ sums.cross
+    information = symmetric(sums.shape) + mixed + np.swapaxes(mixed, 1, 2) + to_light @ symmetric(sums.light) @ by_light
+    lower = np.linalg.cholesky(step.covariance)
+    leverage, directions = np.linalg.eigh(lower.T @ information @ lower)
+    own = np.einsum("cjk,cj->ck", directions, pulls @ lower)
+    own /= np.sqrt(1.0 - np.clip(leverage, 0.0, MOST_LEVERAGE))
+    moved = np.einsum("cjk,ck->cj", directions, own) @ lower.T
+    return moved.T @ moved
 
 
 def at_least(least: Array, other: Array) -> Array:

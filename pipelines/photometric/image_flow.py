@@ -11,28 +11,28 @@ from render.targets.image_region import Region
 POSE = 6  # parameters of a change of pose: a rotation vector on the left in the camera frame, rad, then t
 
 
-def board_points(camera: Camera, cam_from_obj: Pose, region: Region) -> tuple[Array, Mask]:
-    """(n, 2) x and y, unit of t, where the rays of a region's pixels meet the board's plane; (n,) whether they do.
+def plane_points(camera: Camera, cam_from_obj: Pose, region: Region, z: float = 0.0) -> tuple[Array, Mask]:
+    """(n, 3) where the rays of a region's pixels meet the plane at z, unit of t; (n,) whether they do.
 
-    Pixels row by row; 0 where a ray does not meet the plane.
+    Pixels row by row; x and y are 0 where a ray does not meet the plane.
     """
     y, x = np.mgrid[region.y : region.y + region.height, region.x : region.x + region.width]
     rays = camera.bearing(np.column_stack((x.ravel(), y.ravel())))
     obj_from_cam = cam_from_obj.inverse()
     direction = rays @ obj_from_cam.R.T
     with np.errstate(divide="ignore", invalid="ignore"):
-        length = -obj_from_cam.t[2] / direction[:, 2]
+        length = (z - obj_from_cam.t[2]) / direction[:, 2]
         points = obj_from_cam.t[:2] + length[:, None] * direction[:, :2]
     met = np.all(np.isfinite(points), axis=1) & (length > 0.0)
-    return np.where(met[:, None], points, 0.0), met
+    return np.column_stack((np.where(met[:, None], points, 0.0), np.full(len(points), z))), met
 
 
 def image_flow(camera: Camera, cam_from_obj: Pose, points: Array) -> Array:
-    """(2, 6, n) derivatives of the images of (n, 2) points of the board, px, with respect to a change of pose.
+    """(2, 6, n) derivatives of the images of (n, 3) points, px, with respect to a change of pose.
 
     A change is a rotation vector w and a translation d: R becomes exp(w) R and t becomes t + d.
     """
-    turned = cam_from_obj.R[:, :2] @ points.T
+    turned = cam_from_obj.R @ points.T
     by_place = projection_slopes(camera, turned + cam_from_obj.t[:, None])
     flow = np.empty((2, POSE, points.shape[0]))
     for axis in range(2):

@@ -18,9 +18,9 @@ SHAPE, LIGHT = 7, 12  # unknowns of the shape, and of the light in a cell
 
 
 class Sums(NamedTuple):
-    """Sums over pixels, light's by cell of the grid."""
+    """Sums over the pixels of each cell of the grid."""
 
-    shape: Array  # (7, 7), upper triangle
+    shape: Array  # (cells, 7, 7), upper triangles
     cross: Array  # (cells, 12, 7)
     light: Array  # (cells, 12, 12), upper triangles
     right: Array  # (cells, 7)
@@ -30,7 +30,7 @@ class Sums(NamedTuple):
     def zero(cells: int) -> Sums:
         """Of no pixels."""
         return Sums(
-            np.zeros((SHAPE, SHAPE)),
+            np.zeros((cells, SHAPE, SHAPE)),
             np.zeros((cells, LIGHT, SHAPE)),
             np.zeros((cells, LIGHT, LIGHT)),
             np.zeros((cells, SHAPE)),
@@ -98,7 +98,7 @@ def accumulate(
             part = weight * slopes[k]
             sums.right[cell, k] += part * residual
             for j in range(k, 7):
-                sums.shape[k, j] += part * slopes[j]
+                sums.shape[cell, k, j] += part * slopes[j]
         for k in range(12):
             part = weight * basis[k]
             if part == 0.0:

@@ -30,7 +30,7 @@ class LightGrid:
 
     @staticmethod
     def over(target: Target, points: Array, spacing_mm: float) -> LightGrid:
-        """points: (n, 2) of the board's plane, mm. spacing_mm: of the nodes.
+        """points: (n, 2) or (n, 3) near the board's plane, mm. spacing_mm: of the nodes.
 
         The first node lies half a spacing before the board's border: with the side of a square for spacing, nodes lie
         in the middle of squares, and every edge in the middle of a cell, with its surroundings on both sides.

@@ -38,8 +38,7 @@ def solve(sums: Sums, grid: LightGrid, fields: Array) -> Step:
     """
     factor, cross, light_right = _light_system(sums, grid, fields)
     light_of_shape = -cho_solve_banded((factor, True), cross)
-    upper = np.triu(sums.shape)
-    information = upper + np.triu(upper, 1).T + cross.T @ light_of_shape
+    information = symmetric(sums.shape.sum(axis=0)) + cross.T @ light_of_shape
     scale = np.sqrt(np.diag(information))
     if not np.all(np.isfinite(scale) & (scale > 0.0)):
         raise np.linalg.LinAlgError("the pixels do not determine the pose")
@@ -47,6 +46,11 @@ def solve(sums: Sums, grid: LightGrid, fields: Array) -> Step:
     shape = covariance @ (sums.right.sum(axis=0) + light_of_shape.T @ light_right)
     light = cho_solve_banded((factor, True), light_right) + light_of_shape @ shape
     return Step(shape, light.reshape(-1, FIELDS), covariance, light_of_shape)
+
+
+def symmetric(upper: Array) -> Array:
+    """Whole matrices (..., k, k) of their upper triangles, what is below them being 0."""
+    return upper + np.swapaxes(np.triu(upper, 1), -1, -2)
 
 
 def unknowns(grid: LightGrid) -> NDArray[np.int64]:

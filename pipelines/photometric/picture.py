@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from eposit import Camera, Pose
 from eposit.arrays import Array
 from eposit.pose import rotation_from_vector
-from pipelines.photometric.image_flow import board_points, image_flow
+from pipelines.photometric.image_flow import image_flow, plane_points
 from pipelines.photometric.kernels import Sums, accumulate, light_picture
 from pipelines.photometric.light_grid import FIELDS, LightGrid
 from pipelines.photometric.point_spread import LEAST_SIGMA_PX, MOST_SIGMA_PX, PointSpread
@@ -63,23 +63,29 @@ class PictureModel:
     flow: Array  # (2, 6, n)
 
     @staticmethod
-    def around(target: Chessboard, camera: Camera, shape: Shape) -> PictureModel:
-        """The region of the target at a pose, without what surrounds the circle, whose shadow nobody knows.
+    def around(target: Chessboard, camera: Camera, shape: Shape, *, circle: bool = False) -> PictureModel:
+        """The region of the target at a pose.
+
+        circle: whether pixels that see the circle or what surrounds it are compared; nobody knows its shadow.
 
         Raises:
             ValueError: the target has no image in the picture.
         """
-        region = target_region(target, camera, shape.cam_from_obj)
-        points, met = board_points(camera, shape.cam_from_obj, region)
-        seen = pixel_shares(target, camera, shape.cam_from_obj, region).target > 0.0
+        pose = shape.cam_from_obj
+        region = target_region(target, camera, pose)
+        points, met = plane_points(camera, pose, region)
+        seen = pixel_shares(target, camera, pose, region).target > 0.0
         reach = int(np.ceil(AROUND_SIGMA * shape.sigma_px + AROUND_PX))
-        near = cv2.dilate(seen.astype(np.uint8), np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)).ravel() > 0
-        circle = np.hypot(*(points - target.circle_centre[:2]).T)
-        clear = circle > target.circle_radius_mm + SHADOW_HEIGHTS * target.circle_height_mm
-        used = np.flatnonzero(near & met & clear)
+        used = met & (cv2.dilate(seen.astype(np.uint8), np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)).ravel() > 0)
+        if circle:
+            raised, ahead = plane_points(camera, pose, region, target.circle_centre[2])
+            on_circle = ahead & (_from_circle(target, raised) <= target.circle_radius_mm)
+            points[on_circle] = raised[on_circle]
+        else:
+            used &= _from_circle(target, points) > target.circle_radius_mm + SHADOW_HEIGHTS * target.circle_height_mm
         grid = LightGrid.over(target, points, target.square_mm)
-        flow = np.nan_to_num(image_flow(camera, shape.cam_from_obj, points))
-        return PictureModel(target, camera, region, used, grid, flow)
+        flow = np.nan_to_num(image_flow(camera, pose, points))
+        return PictureModel(target, camera, region, np.flatnonzero(used), grid, flow)
 
     def observed(self, image: NDArray[np.uint8]) -> Array:
         """(m,) grey values of the used pixels."""
@@ -108,3 +114,8 @@ class PictureModel:
         places = modelled.channels, self.flow, self.grid.cells, self.grid.shares
         accumulate(self.used, weights, residuals, *places, sums)
         return sums
+
+
+def _from_circle(target: Chessboard, points: Array) -> Array:
+    """(n,) distance of (n, 3) points from the circle's axis, mm."""
+    return np.hypot(*(points[:, :2] - target.circle_centre[:2]).T)

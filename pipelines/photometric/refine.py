@@ -12,18 +12,17 @@ from eposit.arrays import Array
 from eposit.pose import rotation_error_vector
 from pipelines.photometric.covariance import at_least, sandwich
 from pipelines.photometric.image_flow import POSE
-from pipelines.photometric.noise import Noise
+from pipelines.photometric.noise import EDGE_SHARE, Noise
 from pipelines.photometric.normal_equations import Step, solve, solve_light
-from pipelines.photometric.picture import Modelled, PictureModel, Shape
+from pipelines.photometric.picture import PictureModel, Shape
 from render.targets.chessboard import Chessboard
 
 MOST_STEPS = 12  # three to five are usual; it bounds the time that a picture takes
 LEAST_STEPS = 2  # the noise of the first comes from residuals of the start
-STOP = 0.02  # step, in standard deviations of the pose, at which the search has ended; it is still made
+STOP = 0.1  # step, in standard deviations of the pose, at which the search has ended; it is still made
 CAUCHY = 5.0  # deviations at which a pixel has half its weight; gaussian noise then costs 1 % of the information
 MOST_DOUBTED = 0.25  # share of the pixels on edges that may have less than half their weight
 MOST_MOVED = 5.0  # root mean square over six directions, in deviations of start and result together
-EDGE_SHARE = 0.25  # of the strongest slope of the picture: from there a pixel lies on an edge
 
 
 class Refined(NamedTuple):
@@ -87,18 +86,13 @@ def _fit(model: PictureModel, at: _Iterate, observed: Array) -> _Fit:
     modelled = model.picture(at.shape, at.fields)
     grey = modelled.grey[model.used]
     residuals = observed - grey
-    variance = Noise.of(residuals, grey).variance(grey)
+    slope = np.hypot(*modelled.channels[2:4, model.used])
+    variance = Noise.of(residuals, grey, slope).variance(grey, slope)
     trust = 1.0 / (1.0 + residuals**2 / (variance * CAUCHY**2))
     sums = model.sums(modelled, residuals, trust / variance)
     step = solve(sums, model.grid, at.fields)
     covariance = at_least(step.covariance, sandwich(sums, step, model.grid))
-    return _Fit(step, covariance, float(np.mean(trust[_on_edges(model, modelled)] < 0.5)))
-
-
-def _on_edges(model: PictureModel, modelled: Modelled) -> NDArray[np.bool_]:
-    """(m,) which used pixels lie on an edge."""
-    slope = np.hypot(*modelled.channels[2:4, model.used])
-    return slope > EDGE_SHARE * slope.max()
+    return _Fit(step, covariance, float(np.mean(trust[slope > EDGE_SHARE * slope.max()] < 0.5)))
 
 
 def _judged(shape: Shape, fit: _Fit, start: Pose, start_covariance: Array, steps: int) -> Refined:
