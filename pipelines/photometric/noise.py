@@ -34,6 +34,8 @@ class Noise(NamedTuple):
     def of(residuals: Array, grey: Array, slope: Array) -> Noise:
         """A line through the robust variances of dark and of bright pixels, and the excess of those on edges.
 
+        Raises:
+            ValueError: no dark or no bright pixels away from edges, or no edges.
         Source:
             EMVA Standard 1288, release 4.0: the photon transfer curve of a linear camera is a straight line.
         """
@@ -41,6 +43,8 @@ class Noise(NamedTuple):
         edge = slope > EDGE_SHARE * slope.max()
         dark = (grey <= low + ENDS * (high - low)) & ~edge
         bright = (grey >= high - ENDS * (high - low)) & ~edge
+        if not (np.any(dark) and np.any(bright) and np.any(edge)):
+            raise ValueError("the picture has no dark and bright areas with edges between them; give one of a board")
         dark_grey, bright_grey = float(np.mean(grey[dark])), float(np.mean(grey[bright]))
         dark_variance, bright_variance = _variance(residuals[dark]), _variance(residuals[bright])
         per_grey = max((bright_variance - dark_variance) / max(bright_grey - dark_grey, 1.0), 0.0)

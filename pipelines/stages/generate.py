@@ -97,6 +97,15 @@ def _light(dataset: Dataset, frame: Frame) -> tuple[LinearImage, bool]:
         return _rendered(dataset.recipe, frame), True
 
 
+def linear_light(dataset: Dataset, frame: Frame) -> LinearImage:
+    """The frame's linear light: that of the dataset where it is kept, else rendered anew.
+
+    Raises:
+        UserError: it cannot be rendered.
+    """
+    return _light(dataset, frame)[0]
+
+
 def _rendered(recipe: Recipe, frame: Frame) -> LinearImage:
     view = Viewpoint(frame.camera.true_camera(), frame.cam_from_obj, frame.render_seed)
     scenery = recipe.world, frame.world, recipe.target, recipe.light
