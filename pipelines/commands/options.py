@@ -57,9 +57,14 @@ MoreSolvers = Annotated[
 Estimator = Annotated[
     str | None,
     typer.Option(
-        metavar="PACKAGE.MODULE:FUNCTION",
-        help="Instead of a solver, your whole system: a function of image, camera and target.",
+        metavar="NAME",
+        help="Instead of a solver, a whole system: photometric (ours), or your own as package.module:function, a "
+        "function of image, camera and target.",
     ),
+]
+MoreEstimators = Annotated[
+    list[str] | None,
+    typer.Option("--estimator", metavar="NAME", help="A whole system as well, as for `estimate`; may be given again."),
 ]
 PoseFile = Annotated[
     Path | None,

@@ -100,6 +100,15 @@ def _light(dataset: Dataset, frame: Frame) -> tuple[LinearImage, bool]:
         return _rendered(dataset.recipe, frame, dataset.root), True
 
 
+def linear_light(dataset: Dataset, frame: Frame) -> LinearImage:
+    """The frame's linear light: that of the dataset where it is kept, else rendered anew.
+
+    Raises:
+        UserError: it cannot be rendered.
+    """
+    return _light(dataset, frame)[0]
+
+
 def _rendered(recipe: Recipe, frame: Frame, root: Path | None = None) -> LinearImage:
     """root: folder of the dataset that keeps the baked light; without one it is kept in memory."""
     view = Viewpoint(frame.camera.true_camera(), frame.cam_from_obj, frame.render_seed)

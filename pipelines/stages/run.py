@@ -13,7 +13,7 @@ from eposit import Status
 from pipelines.adapters.registry import find_solver
 from pipelines.detection import Detector
 from pipelines.detection.prepare import Kernels
-from pipelines.stages import detect, estimate, generate, score
+from pipelines.stages import bound, detect, estimate, generate, score
 from pipelines.stages import estimate_images as systems
 from pipelines.stages.estimate_images import find_estimator
 from pipelines.stages.import_poses import import_poses
@@ -72,7 +72,7 @@ def run_estimate(
 
 
 def run_system(dataset: Dataset, system: System, execution: Execution, *, overwrite: bool = False) -> None:
-    """Give every image that is missing to a user's whole system; `overwrite` and errors as `run_estimate`."""
+    """Give every missing image to a whole system, ours or a user's; `overwrite` and errors as `run_estimate`."""
     find_estimator(system.name)
     stage = Stage(
         f"estimate {system.shard_name}",
@@ -82,6 +82,12 @@ def run_system(dataset: Dataset, system: System, execution: Execution, *, overwr
         hint=MAKE_AGAIN,
     )
     _run_answers(stage, dataset, system.shard_name, execution, overwrite=overwrite)
+
+
+def run_bound(dataset: Dataset, execution: Execution) -> None:
+    """Compute the pixels' bounds that are missing."""
+    stage = Stage("bound", bound.is_done, bound.run_shard, by_frame=True)
+    run_missing(stage, dataset, _indices(dataset, execution), execution)
 
 
 def run_import(dataset: Dataset, path: Path, system: System, execution: Execution) -> None:
