@@ -63,7 +63,8 @@ class BoardMap:
         """(m, 2) or (2,) points in squares, `height` squares above the board, to (m, 2) or (2,) px."""
         places = np.atleast_2d(np.asarray(at, np.float64))
         pixels = np.empty(places.shape)
-        generic_lens.project(self.R, self.t, self.lens, *_in_space(places, height, self.lift), pixels)
+        x, y, z = _in_space(places, height, self.lift)
+        generic_lens.project(self.R, self.t, self.lens, x, y, z, pixels)
         return pixels[0] if np.ndim(at) == 1 else pixels
 
     def jacobian(self, at: Array, height: float = 0.0, step: float = 1e-3) -> Array:
@@ -89,7 +90,8 @@ class BoardMap:
     def slopes(self, at: Array) -> Array:
         """(m, 2, 13) change of the pixels for a change of each of the map's parameters."""
         out = np.empty((2 * len(at), generic_lens.PARAMETERS))
-        generic_lens.slopes(self.R, self.t, self.lens, *_in_space(at, 0.0, self.lift), out)
+        x, y, z = _in_space(at, 0.0, self.lift)
+        generic_lens.slopes(self.R, self.t, self.lens, x, y, z, out)
         return out.reshape(-1, 2, generic_lens.PARAMETERS)
 
     def meet_planes(self, x_px: Array, y_px: Array, heights: Array) -> Array:

@@ -25,7 +25,9 @@ def find_charuco(image: Grey, target: Charuco) -> SeenPoints | None:
     if ids is None or not len(ids):
         return None
     return SeenPoints(
-        ids.ravel(), _in_picture(np.asarray(corners, np.float64).reshape(-1, 2), scale, offset), "charuco"
+        ids.ravel().astype(np.int64),
+        _in_picture(np.asarray(corners, np.float64).reshape(-1, 2), scale, offset),
+        "charuco",
     )
 
 

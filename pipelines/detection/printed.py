@@ -80,7 +80,10 @@ def unit_mm(target: PrintedBoard) -> float:
     """The length that detection counts in: a square, a tag or a spacing."""
     if isinstance(target, AprilGrid):
         return target.tag_mm
-    return target.spacing_mm if isinstance(target, CircleGrid) else float(target.square_mm)
+    if isinstance(target, CircleGrid):
+        return target.spacing_mm
+    assert isinstance(target, Charuco | PlainChessboard)
+    return target.square_mm
 
 
 def corner_sites(target: PrintedBoard) -> CornerSites:

@@ -99,8 +99,15 @@ class PictureModel:
         """The model's picture and its derivatives."""
         shares = pixel_shares(self.target, self.camera, shape.cam_from_obj, self.region)
         light = np.empty(self.region.width * self.region.height)
-        flat = [part.ravel() for part in shares]
-        light_picture(*flat, self.grid.cells, self.grid.shares, self.grid.columns, fields, light)
+        light_picture(
+            shares.white.ravel(),
+            shares.target.ravel(),
+            self.grid.cells,
+            self.grid.shares,
+            self.grid.columns,
+            fields,
+            light,
+        )
         lit, spread = light.reshape(shares.white.shape).astype(np.float32), PointSpread.of(shape.sigma_px)
         images = (
             spread.blurred(shares.white), spread.blurred(shares.target), *spread.gradient(lit), spread.widened(lit),

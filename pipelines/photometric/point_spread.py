@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from eposit.arrays import Array
 from render.region import Image
@@ -49,6 +48,6 @@ class PointSpread(NamedTuple):
 
 def _filtered(image: Image, along_x: Array, along_y: Array) -> Image:
     """Convolution; OpenCV correlates, so the weights are turned round."""
-    kernels: tuple[NDArray[np.float64], ...] = along_x[::-1].copy(), along_y[::-1].copy()
-    spread = cv2.sepFilter2D(image, -1, *kernels, borderType=cv2.BORDER_REPLICATE)
+    across, down = along_x[::-1].copy(), along_y[::-1].copy()
+    spread = cv2.sepFilter2D(image, -1, across, down, borderType=cv2.BORDER_REPLICATE)
     return spread.astype(np.float32, copy=False)

@@ -36,7 +36,7 @@ def run_shard(dataset: Dataset, index: int, advance: Callable[[], None] = lambda
 
 def _bound(dataset: Dataset, frame: Frame) -> Array:
     """(6, 6), NaN where the pixels do not determine the pose."""
-    linear, target, camera = linear_light(dataset, frame), dataset.recipe.target, frame.camera.true_camera()
+    linear, target, camera = linear_light(dataset, frame), dataset.recipe.chessboard(), frame.camera.true_camera()
     context = FrameContext(target, camera, frame.cam_from_obj, frame.rate, linear.region, frame.sensor_seed)
     try:
         return pixel_bound(linear, frame.sensor, context)

@@ -52,7 +52,8 @@ def run_shard(
 
     The function is called once for each image, (h, w) grey values. advance: called after each frame.
     """
-    function, target = find_estimator(system.name), dataset.recipe.target
+    recipe = dataset.recipe
+    function, target = find_estimator(system.name), recipe.chessboard() if system.name in OWN_SYSTEMS else recipe.target
     path = dataset.shard_path("frames", index, shard_count(dataset.recipe))
     answers: list[PoseResult] = []
     notes: list[str] = []

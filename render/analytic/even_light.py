@@ -16,7 +16,7 @@ from eposit import Camera, Pose
 from render import backend
 from render.analytic.board_reflectance import SMOOTH
 from render.analytic.cells import sample_cells
-from render.analytic.device_target import DeviceAxis, DeviceDisc, DeviceTarget
+from render.analytic.device_target import DeviceTarget, shaded_target
 from render.analytic.rays import DeviceCamera, device_camera
 from render.targets.chessboard import Chessboard
 from render.targets.image_region import Region
@@ -45,7 +45,7 @@ def pixel_shares(target: Chessboard, camera: Camera, cam_from_obj: Pose, region:
         fine_x, fine_y = (at[crossed, None] + inner for at, inner in ((x, inner_x), (y, inner_y)))
         fine = _sampled(device, fine_x.ravel(), fine_y.ravel(), 1.0 / CELL_SIDE)
         reflected[crossed], filled[crossed] = (part.reshape(len(crossed), -1).mean(axis=1) for part in fine[:2])
-    white = (reflected - np.float32(target.black) * filled) / np.float32(target.white - target.black)
+    white: Shares = (reflected - np.float32(target.black) * filled) / np.float32(target.white - target.black)
     shape = region.height, region.width
     return PixelShares(white.reshape(shape), filled.reshape(shape))
 
@@ -63,20 +63,4 @@ def _sampled(
 @functools.lru_cache(maxsize=4)
 def _device_target(target: Chessboard) -> DeviceTarget:
     """The target uploaded with a map of the light that is 1 everywhere and without shadows."""
-    mi, dr = backend.load(), backend.jit()
-
-    def opaque(*values: float) -> list[object]:
-        return [dr.opaque(mi.Float, float(value)) for value in values]
-
-    x0, x1, y0, y1 = target.extent_mm
-    radius = target.circle_radius_mm
-    square, white, black = opaque(target.square_mm, target.white, target.black)
-    return DeviceTarget(
-        x=DeviceAxis(*opaque(x0, x1, -target.square_mm, target.columns, 2)),
-        y=DeviceAxis(*opaque(y0, y1, -target.square_mm, target.rows, 2)),
-        square=square,
-        white=white,
-        black=black,
-        disc=DeviceDisc(*opaque(*target.circle_centre, radius, target.circle, radius)),
-        shading=mi.Float(np.ones(4, np.float32)),
-    )
+    return shaded_target(target, np.ones((2, 2)), 1.0, target.circle_radius_mm)

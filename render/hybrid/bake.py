@@ -88,11 +88,11 @@ class Baker:
         x, y = (values.ravel() for values in np.meshgrid(side, side))
         inside = np.hypot(x, y) < target.circle_radius_mm - 0.75 * step
         points = target.circle_centre + np.column_stack((x, y, 0.0 * x))[inside]
-        halves = [
+        direct, rest = (
             self._light(points, (step, step), light, 16 * self.samples, 24 + i)
             for i, light in enumerate((self._direct, self._rest))
-        ]
-        return sum(halves).mean(axis=(0, 1))
+        )
+        return (direct + rest).mean(axis=(0, 1))
 
     def _light(self, points: Array, step: tuple[float, float], light: Estimator, samples: int, purpose: int) -> Array:
         """(2, n, 3) light at texels with centres (n, 3) and sides `step`, mm, by two independent halves of the rays."""
