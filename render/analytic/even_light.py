@@ -45,9 +45,9 @@ def pixel_shares(target: Chessboard, camera: Camera, cam_from_obj: Pose, region:
         fine_x, fine_y = (at[crossed, None] + inner for at, inner in ((x, inner_x), (y, inner_y)))
         fine = _sampled(device, fine_x.ravel(), fine_y.ravel(), 1.0 / CELL_SIDE)
         reflected[crossed], filled[crossed] = (part.reshape(len(crossed), -1).mean(axis=1) for part in fine[:2])
-    white: Shares = (reflected - np.float32(target.black) * filled) / np.float32(target.white - target.black)
+    white = (reflected - np.float32(target.black) * filled) / np.float32(target.white - target.black)
     shape = region.height, region.width
-    return PixelShares(white.reshape(shape), filled.reshape(shape))
+    return PixelShares(white.reshape(shape).astype(np.float32, copy=False), filled.reshape(shape))
 
 
 def _sampled(
