@@ -204,6 +204,18 @@ SCORES = pa.schema(
     ]
 )
 
+BOUNDS = pa.schema(
+    [
+        _field("frame_id", pa.int64(), "frame"),
+        _field(
+            "covariance",
+            pa.list_(pa.field("element", pa.float64()), 36),
+            "6 x 6, row by row, as in estimates: the least that any unbiased solver reaches on the frame's pixels with "
+            "the light unknown. Null: the pixels do not determine the pose",
+        ),
+    ]
+)
+
 # Columns by which rows are chosen.
 KEYS = (*(field.name for field in _KEY), "pose_id", "camera_name", "detector", "status")
 
@@ -213,6 +225,7 @@ TABLES: dict[str, pa.Schema] = {
     "detections": DETECTIONS,
     "estimates": ESTIMATES,
     "scores": SCORES,
+    "bounds": BOUNDS,
 }
 
 

@@ -25,6 +25,7 @@ COMMANDS: tuple[tuple[Callable[..., None], str], ...] = (
     (stages.detect, "detect out/demo --detector opencv-subpix"),
     (stages.estimate, "estimate out/demo --solver opencv-sqpnp --points truth+noise --noise-px 0.4 --use four"),
     (stages.score, "score out/demo --poses poses.csv --name theirs"),
+    (stages.bound, "bound out/demo"),
     (stages.report, "report out/demo"),
     (stages.frame, "frame out/demo 0 --out out/frame.png"),
     (stages.demo, "demo --out out/demo"),
@@ -33,6 +34,7 @@ COMMANDS: tuple[tuple[Callable[..., None], str], ...] = (
     (tools.doctor, "doctor"),
     (tools.bench, "bench demo --only render --only solver --out bench.md"),
     (tools.paper, "paper --points-only --out out/paper"),
+    (tools.target, "target charuco --out board.pdf"),
     (tools.recipes, "recipes"),
     (tools.describe, "describe demo"),
 )

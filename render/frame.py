@@ -17,11 +17,15 @@ from render.analytic.image_circle import lens_coverage
 from render.analytic.integrate import integrate_region
 from render.colour import luminance
 from render.device import DeviceScene
+from render.hybrid.bake import BakedLight
+from render.hybrid.picture import HybridScene
+from render.hybrid.prepare import baked_light, hybrid_scene
 from render.light import Light
 from render.pathtraced.fisheye import sensor_dict
 from render.pathtraced.picture import Viewpoint, prepared, trace_picture
 from render.pathtraced.scene import reference_scene
 from render.region import Image, target_region
+from render.targets.chessboard import Chessboard
 from render.targets.image_region import Region
 from render.targets.kinds import AnyTarget
 from render.truth.pixels import PixelTruth, pixel_truth
@@ -58,21 +62,33 @@ class LinearImage:
 
 
 def render_world(
-    world: World, draw: WorldDraw, target: AnyTarget, light: Light, view: Viewpoint, *, samples: int, in_colour: bool
+    world: World,
+    draw: WorldDraw,
+    target: AnyTarget,
+    light: Light,
+    view: Viewpoint,
+    *,
+    samples: int,
+    in_colour: bool,
+    baked: BakedLight | None = None,
 ) -> LinearImage:
     """Render one frame of a world in linear light, by the world's method.
 
-    samples: of the closed form, as for `render_frame`.
+    samples: of the closed form, as for `render_frame`. baked: the world's light for the method hybrid; baked here if
+    it is left out.
 
     Raises:
-        ValueError: the target's image lies outside the picture, no light reaches it, or the user's scene cannot be
-            used.
+        ValueError: the target's image lies outside the picture, no light reaches it, the user's scene cannot be used,
+            or the method is hybrid and the target has no raised circle.
     """
     if world.method == "closed":
         grey = render_frame(target, light, view.camera, view.cam_from_obj, samples=samples)
         return replace(grey, radiance=np.repeat(grey.radiance[..., None], 3, axis=2)) if in_colour else grey
     if world.method == "hybrid":
-        raise ValueError("world method 'hybrid' is not there yet; set method to path")
+        if not isinstance(target, Chessboard):
+            raise ValueError(f"method hybrid bakes light for pattern chessboard only, not {target.pattern!r}; use path")
+        baked = baked_light(world, draw, target, light) if baked is None else baked
+        return _hybrid(hybrid_scene(world, draw, target, light, baked), view, samples, in_colour)
     near = target_region(target, view.camera, view.cam_from_obj)
     if world.surround == "studio":  # beyond the target there is nothing but the background
         film = trace_picture(world, draw, target, light, view, near, near)
@@ -82,6 +98,17 @@ def render_world(
     whole = Region.whole(view.camera.width, view.camera.height)
     film = trace_picture(world, draw, target, light, view, near, whole)
     picture = _grey_or_colour(film[..., :3], in_colour)
+    return LinearImage(picture[near.pixels], near, picture)
+
+
+def _hybrid(scene: HybridScene, view: Viewpoint, samples: int, in_colour: bool) -> LinearImage:
+    near = target_region(scene.target, view.camera, view.cam_from_obj)
+    radiance = scene.region(view.camera, view.cam_from_obj, near, cells=samples, seed=view.seed)
+    if scene.empty_radiance is not None:
+        return LinearImage(_grey_or_colour(radiance, in_colour), near, scene.empty_radiance)
+    whole = scene.surroundings(view.camera, view.cam_from_obj, near, seed=view.seed)
+    whole[near.pixels] = radiance
+    picture = _grey_or_colour(whole, in_colour)
     return LinearImage(picture[near.pixels], near, picture)
 
 

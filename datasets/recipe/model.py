@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from importlib import resources
 from pathlib import Path
@@ -92,6 +92,11 @@ class Recipe(BaseModel):
         if len(indices) != 4 or len(set(indices)) != 4:
             raise ValueError(
                 f"four has {len(indices)} points, {len(set(indices))} of them different; give four different ones"
+            )
+        if self.world.method == "hybrid" and not isinstance(self.target, Chessboard):
+            raise ValueError(
+                f"world method is 'hybrid', which bakes light for pattern chessboard only, and the target is "
+                f"{self.target.pattern!r}; set method to path or closed"
             )
         return self
 
@@ -185,6 +190,17 @@ def _completed(data: dict[str, Any], source: str) -> dict[str, Any]:
     if "cameras" in data:
         data["cameras"] = resolved(data["cameras"], source)
     return data
+
+
+def target_of(pattern: str, values: Sequence[str]) -> AnyTarget:
+    """A target with a pattern's defaults but for some values, each KEY=VALUE as a line of a recipe's [target].
+
+    Raises:
+        UserError: an unknown pattern or key, a wrong value, or no KEY=VALUE.
+    """
+    lines = [f"pattern = {json.dumps(pattern)}", *values]
+    text = "\n".join(['name = "target"', 'cameras = "paper"', "[target]", *lines])
+    return parse_recipe(text, "target").target
 
 
 def load_recipe(name: str) -> tuple[Recipe, str]:

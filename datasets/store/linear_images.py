@@ -77,7 +77,7 @@ def read_linear(path: Path, key: str = "") -> LinearImage:
     if not path.is_file():
         raise LinearImageError(f"{path} is missing; run the generate stage again to render it")
     try:
-        with _silent_library(), OpenEXR.File(str(path)) as file:
+        with silent_library(), OpenEXR.File(str(path)) as file:
             header, channels = file.header(), file.channels()
             if header["key"] != key:
                 raise LinearImageError(
@@ -112,7 +112,7 @@ def _region(window: tuple[np.ndarray, np.ndarray]) -> Region:
 
 
 @contextmanager
-def _silent_library() -> Iterator[None]:
+def silent_library() -> Iterator[None]:
     """Nothing is printed: OpenEXR's library writes what it raises to descriptor 2, its Python binding to sys.stdout."""
     kept = os.dup(2)
     try:

@@ -46,7 +46,8 @@ def refused(path: Path, error: OSError) -> UserError:
 
 def stage_of(path: Path) -> str:
     """The stage that makes a table's files; for another detector's points with the option that names it."""
-    stage = {"detections": "detect", "estimates": "estimate", "scores": "score"}.get(path.parent.name, "generate")
+    stages = {"detections": "detect", "estimates": "estimate", "scores": "score", "bounds": "bound"}
+    stage = stages.get(path.parent.name, "generate")
     shard = SHARD_NAME.fullmatch(path.name)
     variant = shard[1] if shard and stage == "detect" and shard[1] != path.parent.name else ""
     return f"{stage} --detector {variant}" if variant else stage

@@ -23,6 +23,7 @@ from pipelines.bench.timing import in_turn
 from pipelines.detection import detect_points
 from pipelines.detection.board_map import grid
 from pipelines.detection.circle import find_circle
+from pipelines.detection.corner_sites import chessboard_sites
 from pipelines.detection.corners import refine_corners
 from pipelines.detection.finders import CLASSIC_FLAGS, SUBPIX_STOP, SUBPIX_WINDOW, find_board, textured_region
 from pipelines.detection.first_map import first_map
@@ -68,14 +69,14 @@ def _detection(image: Any, target: Any) -> Iterator[tuple[str, Call, str, Call]]
     part = image[textured_region(image).pixels]
     finder = functools.partial(cv2.findChessboardCorners, part, target.inner, flags=CLASSIC_FLAGS)
     yield "find the board", functools.partial(find_board, image, target), "OpenCV's finder on its region", finder
-    board = find_board(image, target)
+    board, sites = find_board(image, target), chessboard_sites(target)
     if board is None:
         return
     rough = functools.partial(first_map, board.corners_px, (image.shape[1], image.shape[0]), target)
     start = board.corners_px.astype(np.float32).reshape(-1, 1, 2)
     yield "map from board to image", rough, "its slopes once", functools.partial(rough().slopes, grid(target.inner))
     subpix = lambda: cv2.cornerSubPix(image, start.copy(), SUBPIX_WINDOW, (-1, -1), SUBPIX_STOP)  # noqa: E731
-    yield "corners", functools.partial(refine_corners, image, rough(), target), "cv2.cornerSubPix", subpix
-    corners = refine_corners(image, rough(), target)
+    yield "corners", functools.partial(refine_corners, image, rough(), sites), "cv2.cornerSubPix", subpix
+    corners = refine_corners(image, rough(), sites)
     circle = functools.partial(find_circle, image, corners.board, corners.blur_px, corners.contrast, target)
     yield "circle", circle, "cv2.cornerSubPix", subpix

@@ -57,9 +57,14 @@ MoreSolvers = Annotated[
 Estimator = Annotated[
     str | None,
     typer.Option(
-        metavar="PACKAGE.MODULE:FUNCTION",
-        help="Instead of a solver, your whole system: a function of image, camera and target.",
+        metavar="NAME",
+        help="Instead of a solver, a whole system: photometric (ours), or your own as package.module:function, a "
+        "function of image, camera and target.",
     ),
+]
+MoreEstimators = Annotated[
+    list[str] | None,
+    typer.Option("--estimator", metavar="NAME", help="A whole system as well, as for `estimate`; may be given again."),
 ]
 PoseFile = Annotated[
     Path | None,
@@ -74,6 +79,19 @@ CameraName = Annotated[str, typer.Option("--camera", help="Camera that is assume
 Use = Annotated[str, typer.Option("--use", help="Object points: four or all.")]
 NoisePx = Annotated[float, typer.Option("--noise-px", help="Standard deviation of truth+noise, px per axis.")]
 Draws = Annotated[int, typer.Option("--draws", help="Draws of truth+noise.")]
+
+TargetRecipe = Annotated[
+    str | None, typer.Argument(metavar="[RECIPE]", help="Whose target: a .toml file, or a name from `recipes`.")
+]
+Pattern = Annotated[
+    str | None,
+    typer.Option(help="Instead of a recipe: chessboard, plain_chessboard, charuco, aprilgrid or circles."),
+]
+TargetValues = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="A key of [target] as in a recipe; may be given again."),
+]
+Printed = Annotated[Path, typer.Option("--out", metavar="FILE", help="File to write, .pdf or .svg.")]
 
 Poses = Annotated[int, typer.Option(min=1, help="Poses measured with each camera.")]
 Only = Annotated[

@@ -26,25 +26,33 @@ def run(
     reuse: o.Reuse = None,
     no_masters: o.NoMasters = False,
     solver: o.MoreSolvers = None,
+    estimator: o.MoreEstimators = None,
     workers: o.Workers = 1,
     engine: o.EngineName = "local",
     ray_address: o.RayAddress = None,
     shard: o.Shard = None,
     quiet: o.Quiet = False,
 ) -> None:
-    """Every stage: generate, detect, estimate, score, report."""
+    """Every stage: generate, detect, estimate, score, report; with --estimator photometric the pixels' bound, too."""
     from pipelines.stages import run as stages
+    from pipelines.stages.estimate_images import OWN_SYSTEMS, find_estimator
     from pipelines.stages.kernels import compiled_ahead
-    from pipelines.stages.settings import RUN_SETTINGS, settings_of
+    from pipelines.stages.settings import RUN_SETTINGS, System, settings_of
 
     execution = _execution(engine, workers, ray_address, shard, quiet)
-    settings = [*RUN_SETTINGS, *settings_of(solver or [])]
+    settings, systems = [*RUN_SETTINGS, *settings_of(solver or [])], estimator or []
+    for name in systems:
+        find_estimator(name)
     shared, console = not execution.part.is_whole, execution.console
     with begin(recipe, out, regime, reuse, console, shared=shared, keep_masters=not no_masters) as dataset:
         with compiled_ahead(dataset, execution.part) as kernels:  # beside the first pictures
             stages.run_generate(dataset, execution)
             stages.run_detect(dataset, execution, kernels=kernels)
         stages.run_estimate(dataset, settings, execution)
+        for name in systems:
+            stages.run_system(dataset, System(name), execution)
+        if any(name in OWN_SYSTEMS for name in systems):
+            stages.run_bound(dataset, execution)
         stages.run_score(dataset, execution)
         part = execution.part
         if part.is_whole:
@@ -165,6 +173,22 @@ def score(
         if poses is not None and name is not None:
             stages.run_import(dataset, poses, System(name, camera), execution)
         stages.run_score(dataset, execution)
+
+
+def bound(
+    folder: o.Folder,
+    workers: o.Workers = 1,
+    engine: o.EngineName = "local",
+    ray_address: o.RayAddress = None,
+    shard: o.Shard = None,
+    quiet: o.Quiet = False,
+) -> None:
+    """Compute the least errors that the pixels allow; the report then shows every solver's beside them."""
+    from pipelines.stages import run as stages
+
+    execution = _execution(engine, workers, ray_address, shard, quiet)
+    with writing(folder, shared=not execution.part.is_whole) as dataset:
+        stages.run_bound(dataset, execution)
 
 
 def report(folder: o.Folder) -> None:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from pipelines.bench.table import Comparison, Figure, Row
+    from render.targets.kinds import AnyTarget
 
 
 def verify(folder: o.Folder, json: o.Json = False) -> None:
@@ -73,6 +74,34 @@ def bench(
         _print_measured(times, figures, facts())
     if out is not None:
         write_text(out, markdown(rows, facts()))
+
+
+def target(
+    out: o.Printed,
+    recipe: o.TargetRecipe = None,
+    pattern: o.Pattern = None,
+    values: o.TargetValues = None,
+) -> None:
+    """Write a target's print at true size, to be printed and measured: --pattern charuco --set columns=8."""
+    from datasets.store.atomic import write_text
+    from pipelines.target_print import advice, written
+
+    chosen = _target(recipe, pattern, values or [])
+    write_text(out, written(chosen, out.suffix))
+    typer.echo(f"{out}: {advice(chosen)}")
+
+
+def _target(recipe: str | None, pattern: str | None, values: list[str]) -> AnyTarget:
+    """The target of a recipe, or of a pattern with values of its own."""
+    from datasets.recipe.model import target_of
+
+    if (recipe is None) == (pattern is None):
+        raise UserError("target takes either a recipe or --pattern; give one of them")
+    if recipe is None:
+        return target_of(pattern or "", values)
+    if values:
+        raise UserError("--set goes with --pattern; to change a recipe's target, change its [target]")
+    return load(recipe, None)[0].target
 
 
 def _print_measured(times: list[Comparison], figures: list[Figure], machine: list[tuple[str, str]]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,14 +19,20 @@ FREE = np.array([0.0, 2e-2, 100.0, 100.0, 0.3, 0.3, 0.3])  # how far a lens may 
 HOLD_SHARE = 1e-6  # weight of that against one pixel of one corner: it decides only what nothing else does
 BEND_STEP = 0.05  # squares; second differences at this step are good to 1e-5 px
 
+Lift = Callable[[Array], Array]  # (m, 2) places along a bent print to (m, 3) points, both in squares
+
 
 @dataclass(frozen=True, slots=True)
 class BoardMap:
-    """Map from board coordinates (squares, first inner corner at the origin, z into the board) to px."""
+    """Map from board coordinates (squares, first inner corner at the origin, z into the board) to px.
+
+    On a bent board the coordinates run along the print, which `lift` carries into space.
+    """
 
     R: Array  # (3, 3)
     t: Array  # (3,) squares
     lens: Array  # (7,) see `generic_lens`
+    lift: Lift | None = None  # of a bent board; None for a flat one
 
     @staticmethod
     def fit(
@@ -35,26 +42,29 @@ class BoardMap:
         weights: Array,
         start: BoardMap | None = None,
         hold: float = HOLD_SHARE,
+        lift: Lift | None = None,
     ) -> BoardMap:
         """Least squares over corners (n, 2) px of points (n, 2) in squares.
 
         size: width and height of the picture, px. weights: (n,) inverse variances, 0 for a corner that takes no part.
         start: a map near by; without it, focal lengths over the whole range are tried. hold: how firmly the lens stays
-        near the start's; corners that are only known to a pixel would bend it at will.
+        near the start's; corners that are only known to a pixel would bend it at will. lift: of a bent board; the
+        start's if there is a start.
         """
         begin = _start(at, corners_px, size, weights > 0.0) if start is None else start
         held = np.zeros(7)
         held[1:] = hold * np.median(weights[weights > 0.0]) / FREE[1:] ** 2
-        x, y = (np.ascontiguousarray(column) for column in at.T)
+        lift = lift if start is None else start.lift
         pixels = np.where(weights[:, None] > 0.0, corners_px, 0.0)
-        return BoardMap(*generic_lens.fit(begin.R, begin.t, begin.lens, x, y, pixels, weights, held, FIT_STEPS))
+        points = _in_space(at, 0.0, lift)
+        return BoardMap(*generic_lens.fit(begin.R, begin.t, begin.lens, points, pixels, weights, held, FIT_STEPS), lift)
 
     def __call__(self, at: Array, height: float = 0.0) -> Array:
         """(m, 2) or (2,) points in squares, `height` squares above the board, to (m, 2) or (2,) px."""
-        points = np.atleast_2d(np.asarray(at, np.float64))
-        pixels = np.empty(points.shape)
-        x, y = np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1])
-        generic_lens.project(self.R, self.t, self.lens, x, y, -height, pixels)
+        places = np.atleast_2d(np.asarray(at, np.float64))
+        pixels = np.empty(places.shape)
+        x, y, z = _in_space(places, height, self.lift)
+        generic_lens.project(self.R, self.t, self.lens, x, y, z, pixels)
         return pixels[0] if np.ndim(at) == 1 else pixels
 
     def jacobian(self, at: Array, height: float = 0.0, step: float = 1e-3) -> Array:
@@ -80,8 +90,8 @@ class BoardMap:
     def slopes(self, at: Array) -> Array:
         """(m, 2, 13) change of the pixels for a change of each of the map's parameters."""
         out = np.empty((2 * len(at), generic_lens.PARAMETERS))
-        x, y = (np.ascontiguousarray(column) for column in at.T)
-        generic_lens.slopes(self.R, self.t, self.lens, x, y, out)
+        x, y, z = _in_space(at, 0.0, self.lift)
+        generic_lens.slopes(self.R, self.t, self.lens, x, y, z, out)
         return out.reshape(-1, 2, generic_lens.PARAMETERS)
 
     def meet_planes(self, x_px: Array, y_px: Array, heights: Array) -> Array:
@@ -92,6 +102,13 @@ class BoardMap:
         out = np.empty((len(heights), 2, len(y_px), len(x_px)))
         generic_lens.meet_planes(self.R, self.t, self.lens, x_px, y_px, -np.asarray(heights, np.float64), out)
         return out
+
+
+def _in_space(at: Array, height: float, lift: Lift | None) -> Array:
+    """(3, m) x, y, z of (m, 2) places in squares, `height` squares above a flat board."""
+    if lift is not None:
+        return np.ascontiguousarray(lift(at).T)
+    return np.vstack((at.T, np.full(len(at), -height)))
 
 
 def grid(inner: tuple[int, int]) -> Array:

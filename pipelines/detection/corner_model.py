@@ -204,6 +204,7 @@ def prepare() -> None:
         bends=np.empty((0, 2)),
         inverses=np.empty((0, 2, 2)),
         reaches=np.empty((0, 2)),
+        clears=np.empty(0),
         window=1,
         discs=np.empty((0, 2)),
         disc_axes=np.eye(2),

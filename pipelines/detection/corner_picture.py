@@ -40,6 +40,7 @@ class CornerTask(NamedTuple):
     bends: Array  # (n, 2) curvatures of the edges towards their normals, 1/px
     inverses: Array  # (n, 2, 2) squares per px
     reaches: Array  # (n, 2) squares along both axes that a fit may use
+    clears: Array  # (n,) squares; pixels farther than this from both lines see other print
     window: int  # px, likewise
     discs: Array  # (k, 2) centres, px, of ellipses to leave out
     disc_axes: Array  # (2, 2) from px to the unit circle of such an ellipse
@@ -59,6 +60,7 @@ class CornerPixels(NamedTuple):
 def gather(image: NDArray[np.uint8], task: CornerTask, i: int, pixels: CornerPixels) -> int:
     """Number of the pixels of corner i: within the window, its reach along both axes, and off the discs."""
     inverses, reaches, window, discs, disc_axes = task.inverses, task.reaches, task.window, task.discs, task.disc_axes
+    clear = task.clears[i]
     x, y, grey = pixels.x, pixels.y, pixels.grey
     x0, y0 = task.starts[i, 0], task.starts[i, 1]
     n, left, top = 0, math.floor(x0 + 0.5), math.floor(y0 + 0.5)
@@ -68,6 +70,7 @@ def gather(image: NDArray[np.uint8], task: CornerTask, i: int, pixels: CornerPix
             u, v = column - x0, row - y0
             across, down = inverses[i, 0, 0] * u + inverses[i, 0, 1] * v, inverses[i, 1, 0] * u + inverses[i, 1, 1] * v
             far = abs(across) > reaches[i, 0] or abs(down) > reaches[i, 1] or u * u + v * v > window * window
+            far = far or (abs(across) > clear and abs(down) > clear)
             if far or row >= image.shape[0] or column >= image.shape[1]:
                 continue
             covered = False

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from eposit.arrays import Array
 from render.targets.chessboard import Chessboard
 from render.targets.image_region import Region
+from render.targets.plain_chessboard import PlainChessboard
 
 Grey = NDArray[np.uint8]
 
@@ -38,7 +39,7 @@ class Found:
     finder: str  # which finder saw it
 
 
-def find_board(image: Grey, target: Chessboard) -> Found | None:
+def find_board(image: Grey, target: Chessboard | PlainChessboard) -> Found | None:
     """The board's corners, or None if no finder sees a complete board that can be put in order."""
     for name, finder in FINDERS.items():
         corners = finder(image, target.inner)
@@ -50,7 +51,7 @@ def find_board(image: Grey, target: Chessboard) -> Found | None:
     return None
 
 
-def find_sector_based(image: Grey, target: Chessboard) -> Found | None:
+def find_sector_based(image: Grey, target: Chessboard | PlainChessboard) -> Found | None:
     """The board as `cv2.findChessboardCornersSB` alone sees it, to its own accuracy."""
     corners = _sector_based(image, target.inner)
     ordered = None if corners is None else _ordered(image, corners.reshape(-1, 2), target)
@@ -128,7 +129,7 @@ def textured_region(image: Grey) -> Region:
     return Region.between((x0, y0), (x1, y1))
 
 
-def _ordered(image: Grey, corners: Array, target: Chessboard) -> Array | None:
+def _ordered(image: Grey, corners: Array, target: Chessboard | PlainChessboard) -> Array | None:
     """Corners in the target's order: x to y turns as the image's axes do, and the first square is the black one."""
     across, down = target.inner
     grid = corners.reshape(down, across, 2)
@@ -142,4 +143,19 @@ def _ordered(image: Grey, corners: Array, target: Chessboard) -> Array | None:
         return None
     black = np.add.outer(np.arange(down - 1), np.arange(across - 1)) % 2 == 0
     grey = image[y, x]
-    return (grid if grey[black].mean() < grey[~black].mean() else grid[::-1, ::-1]).reshape(-1, 2)
+    if (across + down) % 2 == 1:
+        return (grid if grey[black].mean() < grey[~black].mean() else grid[::-1, ::-1]).reshape(-1, 2)
+    return _upright(grid, bool(grey[black].mean() < grey[~black].mean()))
+
+
+def _upright(grid: Array, is_black_first: bool) -> Array | None:
+    """Corners (rows, columns, 2) of a board that looks the same after half a turn: x to the right in the picture.
+
+    A quarter of a turn exchanges black and white, which is no way out for a board that is not square.
+    """
+    if not is_black_first:
+        if grid.shape[0] != grid.shape[1]:
+            return None
+        grid = np.rot90(grid)
+    along_x = grid[:, -1].mean(0) - grid[:, 0].mean(0)
+    return (grid if along_x[0] > 0.0 else grid[::-1, ::-1]).reshape(-1, 2)

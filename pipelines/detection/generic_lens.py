@@ -27,13 +27,13 @@ LEAST_GAIN = 1e-4  # of the cost in one step: a hundredth of a corner; a pinhole
 
 
 @compiled
-def project(R: Array, t: Array, lens: Array, x: Array, y: Array, z: float, out: Array) -> None:
-    """Points (n,), (n,) on the plane z of the board to (n, 2) px in `out`."""
+def project(R: Array, t: Array, lens: Array, x: Array, y: Array, z: Array, out: Array) -> None:
+    """Points (n,), (n,), (n,) in the board's frame to (n, 2) px in `out`."""
     f, aspect, cx, cy, k1, k2, k3 = lens
     for i in range(len(x)):
-        u = R[0, 0] * x[i] + R[0, 1] * y[i] + R[0, 2] * z + t[0]
-        v = R[1, 0] * x[i] + R[1, 1] * y[i] + R[1, 2] * z + t[1]
-        w = R[2, 0] * x[i] + R[2, 1] * y[i] + R[2, 2] * z + t[2]
+        u = R[0, 0] * x[i] + R[0, 1] * y[i] + R[0, 2] * z[i] + t[0]
+        v = R[1, 0] * x[i] + R[1, 1] * y[i] + R[1, 2] * z[i] + t[1]
+        w = R[2, 0] * x[i] + R[2, 1] * y[i] + R[2, 2] * z[i] + t[2]
         side = math.hypot(u, v)
         theta = math.atan2(side, w)
         t2 = theta * theta
@@ -75,14 +75,16 @@ def _copy_pose(R: Array, t: Array, lens: Array, R_out: Array, t_out: Array, lens
 
 
 @compiled
-def slopes(R: Array, t: Array, lens: Array, x: Array, y: Array, out: Array) -> None:
-    """(2 n, 13) change of the pixels of points on the board for a change of each parameter.
+def slopes(R: Array, t: Array, lens: Array, x: Array, y: Array, z: Array, out: Array) -> None:
+    """(2 n, 13) change of the pixels of points in the board's frame for a change of each parameter.
 
     In order: a rotation vector on the left of R, the translation, the lens.
     """
     f, aspect, _, _, k1, k2, k3 = lens
     for i in range(len(x)):
-        a, b, c = R[0, 0] * x[i] + R[0, 1] * y[i], R[1, 0] * x[i] + R[1, 1] * y[i], R[2, 0] * x[i] + R[2, 1] * y[i]
+        a = R[0, 0] * x[i] + R[0, 1] * y[i] + R[0, 2] * z[i]
+        b = R[1, 0] * x[i] + R[1, 1] * y[i] + R[1, 2] * z[i]
+        c = R[2, 0] * x[i] + R[2, 1] * y[i] + R[2, 2] * z[i]
         u, v, w = a + t[0], b + t[1], c + t[2]
         side = max(math.hypot(u, v), 1e-12)
         theta, square = math.atan2(side, w), side * side + w * w
@@ -141,13 +143,14 @@ def _normal_equations(
 
 @compiled
 def fit(
-    R: Array, t: Array, lens: Array, x: Array, y: Array, pixels: Array, weights: Array, hold: Array, steps: int
+    R: Array, t: Array, lens: Array, points: Array, pixels: Array, weights: Array, hold: Array, steps: int
 ) -> tuple[Array, Array, Array]:
-    """Levenberg-Marquardt over pose and lens on (n, 2) pixels of points (n,), (n,) of the board.
+    """Levenberg-Marquardt over pose and lens on (n, 2) pixels of points of the board.
 
-    weights: (n,) inverse variances, 0 where a point takes no part. hold: (7,) weak weights that keep the lens near
-    where it starts, for what one view does not tell.
+    points: (3, n) x, y, z. weights: (n,) inverse variances, 0 where a point takes no part. hold: (7,) weak weights that
+    keep the lens near where it starts, for what one view does not tell.
     """
+    x, y, z = points[0], points[1], points[2]
     n, expected = len(x), lens
     R_old, t_old, R, t, lens = R, t, np.empty((3, 3)), np.empty(3), np.empty(len(lens))
     _copy_pose(R_old, t_old, expected, R, t, lens)
@@ -155,10 +158,10 @@ def fit(
     found, trial, jacobian = np.empty((n, 2)), np.empty((n, 2)), np.empty((2 * n, PARAMETERS))
     normal, lower = np.empty((PARAMETERS, PARAMETERS)), np.empty((PARAMETERS, PARAMETERS))
     right, change = np.empty(PARAMETERS), np.empty(PARAMETERS)
-    project(R, t, lens, x, y, 0.0, found)
+    project(R, t, lens, x, y, z, found)
     cost, damping = _cost(pixels, found, weights, lens, expected, hold), 1e-3
     for _ in range(steps):
-        slopes(R, t, lens, x, y, jacobian)
+        slopes(R, t, lens, x, y, z, jacobian)
         _normal_equations(jacobian, pixels, found, weights, normal, right)
         for k in range(1, 7):
             normal[6 + k, 6 + k] += hold[k]
@@ -168,7 +171,7 @@ def fit(
             new = np.inf
             if solve_damped(normal, right, damping, lower, change):
                 _changed(R, t, lens, change, R_new, t_new, lens_new)
-                project(R_new, t_new, lens_new, x, y, 0.0, trial)
+                project(R_new, t_new, lens_new, x, y, z, trial)
                 new = _cost(pixels, trial, weights, lens_new, expected, hold)
             if new <= cost:
                 gain = (cost - new) / cost if cost > 0.0 else 0.0
@@ -221,7 +224,7 @@ def prepare() -> None:
     """Call each compiled function once."""
     R, t, at = np.eye(3), np.array([0.0, 0.0, 5.0]), np.arange(2.0)
     lens = np.array([100.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    project(R, t, lens, at, at, 0.0, np.empty((2, 2)))
-    slopes(R, t, lens, at, at, np.empty((4, PARAMETERS)))
+    project(R, t, lens, at, at, at, np.empty((2, 2)))
+    slopes(R, t, lens, at, at, at, np.empty((4, PARAMETERS)))
     meet_planes(R, t, lens, at, at, at, np.empty((2, 2, 2, 2)))
-    fit(R, t, lens, at, at, np.zeros((2, 2)), np.ones(2), np.ones(7), 1)
+    fit(R, t, lens, np.zeros((3, 2)), np.zeros((2, 2)), np.ones(2), np.ones(7), 1)

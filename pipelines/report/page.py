@@ -14,10 +14,11 @@ from pipelines.pages.sections import Drawing
 from pipelines.pages.template import rendered
 from pipelines.report import figures, pictures
 from pipelines.report.data import Cell, Series, cells, normalised_rows, series
+from pipelines.report.pixel_bound import bound_rows
 from pipelines.report.points import PointErrors, field_rows, point_errors, tilt_rows
 from pipelines.report.run import Run
 from pipelines.report.summary import summarised
-from pipelines.report.tables import field_table, normalised_table
+from pipelines.report.tables import bound_table, field_table, normalised_table
 from pipelines.statistics import LEAST_FOR_TAIL
 
 REPORT = "report.html"
@@ -44,6 +45,7 @@ def write_report(dataset: Dataset) -> Path:
         **_frames(dataset, frames, points, found),
         **_detection(points, frames),
         **_poses(found, frames),
+        bound=bound_table(bounds) if (bounds := bound_rows(dataset)) else None,
         versions=versions(),
     )
     path = dataset.root / REPORT

@@ -1,4 +1,4 @@
-"""Whole systems of others, from an image to a pose: a user's function, or a file of poses.
+"""Whole systems, from an image to a pose: `photometric`, a user's function, or a file of poses.
 
 Their rows stand in `estimates` beside the solvers': points "image", use "all", draw 0.
 """
@@ -24,16 +24,18 @@ from pipelines.stages.estimate import path_of_shard
 from pipelines.stages.settings import ALL, IMAGE, System, assumed
 from render.targets.kinds import AnyTarget
 
+OWN_SYSTEMS = {"photometric": "pipelines.photometric:estimate"}  # by the names that tables have
+
 Estimator = Callable[[NDArray[np.uint8], Camera, AnyTarget], Any]
 
 
 def find_estimator(name: str) -> Estimator:
-    """The user's function package.module:function, which takes image, camera and target.
+    """A system of ours by its name, or the user's package.module:function: it takes image, camera and target.
 
     Raises:
         UserError: it cannot be imported, or does not take three arguments.
     """
-    function = load_function(name, "--estimator")
+    function = load_function(OWN_SYSTEMS.get(name, name), "--estimator")
     check_call(function, f"--estimator {name}", "(image, camera, target)", 3)
     return function
 
@@ -50,7 +52,8 @@ def run_shard(
 
     The function is called once for each image, (h, w) grey values. advance: called after each frame.
     """
-    function, target = find_estimator(system.name), dataset.recipe.target
+    recipe = dataset.recipe
+    function, target = find_estimator(system.name), recipe.chessboard() if system.name in OWN_SYSTEMS else recipe.target
     path = dataset.shard_path("frames", index, shard_count(dataset.recipe))
     answers: list[PoseResult] = []
     notes: list[str] = []

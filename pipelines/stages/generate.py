@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -15,6 +16,7 @@ from datasets.plan import Frame, frames_of_shard, shard_count
 from datasets.recipe.model import Recipe
 from datasets.rows import pose_columns, table
 from datasets.schema import FRAMES, KEYPOINTS, WORLD_PREFIX
+from datasets.store.baked_light import light_of
 from datasets.store.dataset import Dataset
 from datasets.store.images import encode_png
 from datasets.store.linear_images import LinearImageError, are_kept, linear_key, linear_path, read_linear, write_linear
@@ -24,6 +26,7 @@ from eposit.arrays import Array, Mask
 from eposit.pose import tilt_rad
 from pipelines.engines.background import overlapped
 from render.frame import LinearImage, render_world, truth_of
+from render.hybrid.bake import BakedLight
 from render.pathtraced.picture import Viewpoint
 from render.sensor.develop import FrameContext, develop
 from render.targets.image_region import Region
@@ -94,16 +97,37 @@ def _light(dataset: Dataset, frame: Frame) -> tuple[LinearImage, bool]:
     try:
         return read_linear(dataset.root / linear_path(frame), linear_key(dataset.recipe, frame)), False
     except LinearImageError:
-        return _rendered(dataset.recipe, frame), True
+        return _rendered(dataset.recipe, frame, dataset.root), True
 
 
-def _rendered(recipe: Recipe, frame: Frame) -> LinearImage:
+def linear_light(dataset: Dataset, frame: Frame) -> LinearImage:
+    """The frame's linear light: that of the dataset where it is kept, else rendered anew.
+
+    Raises:
+        UserError: it cannot be rendered.
+    """
+    return _light(dataset, frame)[0]
+
+
+def _rendered(recipe: Recipe, frame: Frame, root: Path | None = None) -> LinearImage:
+    """root: folder of the dataset that keeps the baked light; without one it is kept in memory."""
     view = Viewpoint(frame.camera.true_camera(), frame.cam_from_obj, frame.render_seed)
     scenery = recipe.world, frame.world, recipe.target, recipe.light
+    samples, in_colour = recipe.sample_count(), recipe.outputs.colour
     try:
-        return render_world(*scenery, view, samples=recipe.sample_count(), in_colour=recipe.outputs.colour)
+        baked = _baked(recipe, frame, root)
+        return render_world(*scenery, view, samples=samples, in_colour=in_colour, baked=baked)
     except ValueError as error:
         raise UserError(f"frame {frame.frame_id}: {error}") from error
+
+
+def _baked(recipe: Recipe, frame: Frame, root: Path | None) -> BakedLight | None:
+    if root is None or recipe.world.method != "hybrid":
+        return None
+    try:
+        return light_of(root, recipe, frame)
+    except OSError as error:
+        raise refused(root, error) from error
 
 
 def _developed(recipe: Recipe, frame: Frame, linear: LinearImage) -> NDArray[np.uint8]:

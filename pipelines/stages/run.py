@@ -13,13 +13,13 @@ from eposit import Status
 from pipelines.adapters.registry import find_solver
 from pipelines.detection import Detector
 from pipelines.detection.prepare import Kernels
-from pipelines.stages import detect, estimate, generate, score
+from pipelines.stages import bound, detect, estimate, generate, score
 from pipelines.stages import estimate_images as systems
 from pipelines.stages.estimate_images import find_estimator
 from pipelines.stages.import_poses import import_poses
 from pipelines.stages.kernels import compiled_ahead, wait_for
 from pipelines.stages.missing import Execution, Stage, run_missing
-from pipelines.stages.settings import Setting, System, check_detector
+from pipelines.stages.settings import Setting, System, check_detector, check_target
 
 MAKE_AGAIN = "; --overwrite makes them again"
 
@@ -37,9 +37,10 @@ def run_detect(
 
     kernels: the compiled functions, if they have been begun before.
     Raises:
-        UserError: an unknown detector.
+        UserError: an unknown detector, or one that does not find this kind of target.
     """
     check_detector(detector)
+    check_target(detector, dataset.recipe.target)
     with compiled_ahead(dataset, execution.part, detector, kernels) as needed:
         wait_for(needed, execution.console)
     stage = Stage(
@@ -71,7 +72,7 @@ def run_estimate(
 
 
 def run_system(dataset: Dataset, system: System, execution: Execution, *, overwrite: bool = False) -> None:
-    """Give every image that is missing to a user's whole system; `overwrite` and errors as `run_estimate`."""
+    """Give every missing image to a whole system, ours or a user's; `overwrite` and errors as `run_estimate`."""
     find_estimator(system.name)
     stage = Stage(
         f"estimate {system.shard_name}",
@@ -81,6 +82,12 @@ def run_system(dataset: Dataset, system: System, execution: Execution, *, overwr
         hint=MAKE_AGAIN,
     )
     _run_answers(stage, dataset, system.shard_name, execution, overwrite=overwrite)
+
+
+def run_bound(dataset: Dataset, execution: Execution) -> None:
+    """Compute the pixels' bounds that are missing."""
+    stage = Stage("bound", bound.is_done, bound.run_shard, by_frame=True)
+    run_missing(stage, dataset, _indices(dataset, execution), execution)
 
 
 def run_import(dataset: Dataset, path: Path, system: System, execution: Execution) -> None:

@@ -12,7 +12,8 @@ from datasets.rows import camera_of
 from eposit import Camera
 from pipelines.adapters.registry import check_solver, find_solver, takes_four
 from pipelines.adapters.user import file_name
-from pipelines.detection import Detector
+from pipelines.detection import Detector, takes_target
+from render.targets.kinds import AnyTarget
 
 POINTS = ("detected", "truth", "truth+noise")
 DETECTED_BY = "detected-"  # before the name of another detector than ours, in tables
@@ -28,6 +29,17 @@ def check_detector(name: str) -> None:
     """
     if name not in list(Detector):
         raise UserError(f"unknown detector {name!r}; choose one of {', '.join(Detector)}")
+
+
+def check_target(detector: str, target: AnyTarget) -> None:
+    """Refuse a detector that does not find a kind of target.
+
+    Raises:
+        UserError: with those that do.
+    """
+    if not takes_target(detector, target):
+        others = ", ".join(name for name in Detector if takes_target(name, target))
+        raise UserError(f"detector {detector!r} does not find the target {target.pattern!r}; choose one of {others}")
 
 
 @dataclass(frozen=True, slots=True)

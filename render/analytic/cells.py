@@ -35,8 +35,9 @@ def sample_cells(
 ) -> CellSample:
     """What cells see whose centres are at x_px, y_px and whose sides are `size`, px."""
     rays = camera.rays(x_px, y_px)
-    sample = _sample_print if isinstance(target, DevicePrint) else _sample_chessboard
-    return sample(target, camera, rays, size)
+    if isinstance(target, DevicePrint):
+        return _sample_print(target, camera, rays, size)
+    return _sample_chessboard(target, camera, rays, size)
 
 
 def _sample_print(target: DevicePrint, camera: DeviceCamera, rays: RayBundle, size: DeviceFloat) -> CellSample:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from eposit.arrays import Array
 from render import backend
 from render.analytic.device_print import DevicePrint, device_print
 from render.device import DeviceFloat
@@ -54,15 +55,22 @@ class DeviceTarget:
 @functools.lru_cache(maxsize=4)
 def device_target(target: Chessboard, light: Light) -> DeviceTarget:
     """Upload the target and the map of its light, once."""
+    return shaded_target(target, *shading_map(target, light), shadow_radius(target, light))
+
+
+def shaded_target(target: Chessboard, shading: Array, disc_shading: float, shadow_radius_mm: float) -> DeviceTarget:
+    """Upload the target and a map of its light.
+
+    shading, disc_shading: as of `render.light.shading_map`. shadow_radius_mm: as of `render.light.shadow_radius`.
+    """
     mi, dr = backend.load(), backend.jit()
 
     def opaque(*values: float) -> list[DeviceFloat]:
         return [dr.opaque(mi.Float, float(value)) for value in values]
 
-    shading, disc_shading = shading_map(target, light)
     rows, columns = shading.shape
     x0, x1, y0, y1 = target.extent_mm
-    disc = (*target.circle_centre, target.circle_radius_mm, disc_shading * target.circle, shadow_radius(target, light))
+    disc = (*target.circle_centre, target.circle_radius_mm, disc_shading * target.circle, shadow_radius_mm)
     square, white, black = opaque(target.square_mm, target.white, target.black)
     return DeviceTarget(
         x=DeviceAxis(*opaque(x0, x1, -target.square_mm, target.columns, columns)),

@@ -39,21 +39,41 @@ def integrate_region(
 
     samples: cells of a pixel that several edges cross, a square number.
     """
-    mi, dr = backend.load(), backend.jit()
     scene = device_scene(target, light), device_camera(camera, cam_from_obj)
-    background = dr.opaque(mi.Float, light.background)
+    return integrate_shaded(*scene, camera, region, samples, light.background)
+
+
+def integrate_shaded(
+    target: DeviceTarget | DevicePrint,
+    device_camera: DeviceCamera,
+    camera: Camera,
+    region: Region,
+    samples: int,
+    background: float,
+    divided: NDArray[np.bool_] | None = None,
+) -> NDArray[np.float32]:
+    """(height, width) mean radiance of the pixels of a region, of a target under any map of light.
+
+    device_camera: `camera` at its pose. divided: (height, width) pixels to divide into cells even where no edge of the
+    target crosses them, for shadows with an edge.
+    """
+    mi, dr = backend.load(), backend.jit()
+    scene = target, device_camera
+    radiance_behind = dr.opaque(mi.Float, background)
     place = _DeviceRegion(*(dr.opaque(mi.Int32, value) for value in region[:3]))
     centres = place.pixel_centres(dr.arange(mi.Int32, region.width * region.height))
     seen = _lens_coverage(camera, *centres)
     found = sample_cells(*scene, *centres, mi.Float(1.0))
-    picture = found.radiance + background * dr.maximum(seen - found.filled, 0.0)
+    picture = found.radiance + radiance_behind * dr.maximum(seen - found.filled, 0.0)
     edges = dr.select((seen > 0.0) & (seen < 1.0), MANY_EDGES, dr.select(seen > 0.0, found.edges, SMOOTH))
+    if divided is not None:
+        edges = dr.select(mi.Bool(divided.ravel()), MANY_EDGES, edges)
     dr.eval(picture, edges, seen)
     for kind, cells in ((ONE_EDGE, min(samples, ONE_EDGE_CELLS)), (MANY_EDGES, samples)):
         for pixels in _chunks(edges == kind, max(1, CHUNK // cells)):
             radiance, filled = _mean_of_cells(*scene, place.pixel_centres(mi.Int32(pixels)), cells)
             behind = dr.maximum(dr.gather(mi.Float, seen, pixels) - filled, 0.0)
-            dr.scatter(picture, radiance + background * behind, pixels)
+            dr.scatter(picture, radiance + radiance_behind * behind, pixels)
     return np.array(picture).reshape(region.height, region.width)
 
 

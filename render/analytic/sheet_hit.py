@@ -8,7 +8,7 @@ from render import backend
 from render.analytic.device_print import DeviceSheet
 from render.analytic.plane_hit import FAR, PlaneHit
 from render.analytic.rays import DeviceCamera, RayBundle
-from render.device import DeviceBool, DeviceFloat
+from render.device import DeviceBool, DeviceFloat, DeviceVector3
 
 NEWTON_STEPS = 6
 MISS_MM = 0.02  # what a float32 leaves of a distance of some metres after Newton's steps is a hundredth of it
@@ -45,7 +45,7 @@ def meet_sheet(
     met = (length > 0.0) & (dr.abs(z0 + length * direction.z - height.z) < MISS_MM)
     slope_x, slope_y, scale = direction.x / closing, direction.y / closing, length * size
 
-    def steps(change: DeviceFloat, slope: DeviceFloat, along: DeviceFloat) -> DeviceFloat:
+    def steps(change: DeviceFloat, slope: DeviceFloat, along: DeviceVector3) -> DeviceFloat:
         return scale * (change - slope * _closing(height, along))
 
     (at_x, stretch_x), (at_y, stretch_y) = (_along_sheet(sheet, i, value) for i, value in enumerate((x, y)))
@@ -60,7 +60,7 @@ def meet_sheet(
     return hit, closing > 0.0
 
 
-def _closing(height: _Height, direction: DeviceFloat) -> DeviceFloat:
+def _closing(height: _Height, direction: DeviceVector3) -> DeviceFloat:
     """How fast a direction leads through the sheet, from front to back."""
     return direction.z - height.rise_x * direction.x - height.rise_y * direction.y
 

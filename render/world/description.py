@@ -95,9 +95,6 @@ class World:
     path_depth: Annotated[int, "longest path: 2 is direct light, 6 has most of a room's"] = 6
     bake_samples: Annotated[int, "rays for a texel of the baked light, by hybrid"] = 256
     layer_samples: Annotated[int, "rays for a pixel of the shiny layer, by hybrid"] = 4
-    background: Annotated[
-        Literal["traced", "panorama"], "behind the target, by hybrid: traced for each frame, or a panorama made once"
-    ] = "traced"
 
     def __post_init__(self) -> None:
         self._check_method()

@@ -53,9 +53,11 @@ def other_boards(count: int, target: AnyTarget, rng: np.random.Generator) -> Obj
     found: Objects = {}
     for i in range(count):
         columns, rows = (int(n) for n in rng.integers(4, 11, 2))
-        if (columns, rows) in ((target.columns, target.rows), (target.rows, target.columns)):
+        across, down = target.point_grid
+        if (columns, rows) in ((across + 1, down + 1), (down + 1, across + 1)):
             columns += 1
-        square = float(rng.uniform(0.4, 0.8)) * target.square_mm
+        x0, x1, _, _ = target.extent_mm
+        square = float(rng.uniform(0.4, 0.8)) * (x1 - x0) / (across + 3)  # of the paper's board a square's side
         matrix = np.eye(4)
         # z out of the board's front is -z of the object frame: half a turn about x, then a random lean.
         matrix[:3, :3] = rotation_from_vector(rng.normal(0.0, 0.35, 3)) @ np.diag([1.0, -1.0, -1.0])

@@ -128,7 +128,7 @@ def test_what_was_nearest_to_its_margin(ask):
 
 def test_the_smallest_visible_change_beside_the_margin(ask):
     rows = {row[0]: row[1:] for row in ask("visible")}
-    assert rows.keys() == METRICS.keys()
+    assert rows.keys() == {name for name in METRICS if not name.endswith("_error")}  # those are of users' systems
     assert all((unit, margin) == (METRICS[name].unit, METRICS[name].margin) for name, (unit, _, margin) in rows.items())
 
 

@@ -5,7 +5,8 @@ import pytest
 
 from pipelines.detection.corner_model import fit_corners
 from pipelines.detection.corner_picture import BLUR, SHAPE, CornerTask
-from pipelines.detection.corners import FINAL, REACH, STOP
+from pipelines.detection.corner_sites import REACH
+from pipelines.detection.corners import FINAL, STOP
 from tests.supersampled import digitised, picture, side
 
 HALF = 12  # of a tile, px
@@ -89,7 +90,9 @@ def fitted(image, corners, scene, rng, start_px=0.3, **changed):
         "disc_axes": np.eye(2),
         **changed,
     }
-    task = CornerTask(shapes=shapes, inverses=np.tile(inverse, (n, 1, 1)), window=FINAL.window_px, **given)
+    task = CornerTask(
+        shapes=shapes, clears=np.full(n, np.inf), inverses=np.tile(inverse, (n, 1, 1)), window=FINAL.window_px, **given
+    )
     shapes, covariance, noise, converged = fit_corners(image, task, STEPS, STOP)
     return shapes[:, :2] - middles - corners, shapes, covariance * noise[:, None, None], noise, converged
 

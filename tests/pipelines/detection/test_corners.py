@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from pipelines.detection.board_map import BoardMap
+from pipelines.detection.corner_sites import chessboard_sites
 from pipelines.detection.corners import refine_corners
 from tests.pipelines.detection.test_finders import CORNERS, TARGET, drawn
 
@@ -25,7 +26,7 @@ def test_a_corner_states_a_third_of_its_own_noise_and_two_thirds_of_the_boards(c
     stated = []
     for amount in (np.full(image.shape, 4.0), np.where(around, 8.0, 4.0)):
         grey = np.clip(np.rint(image + amount * noise), 0, 255).astype(np.uint8)
-        corners = refine_corners(grey, board, TARGET)
+        corners = refine_corners(grey, board, chessboard_sites(TARGET))
         assert corners.consistent.all()
         stated.append(np.trace(corners.covariance_px2, axis1=1, axis2=2))
     ratio = stated[1] / stated[0]

@@ -13,6 +13,7 @@ from datasets.recipe.model import load_recipe
 from datasets.store.dataset import open_dataset
 from pipelines.detection import Detector, detect_points
 from pipelines.detection.board_map import BoardMap, grid
+from pipelines.detection.corner_sites import chessboard_sites
 from pipelines.detection.corners import refine_corners
 from render.frame import render_frame
 from render.sensor.develop import develop
@@ -147,7 +148,7 @@ def test_a_disturbed_corner_is_dropped_and_the_others_stay(demo):
     x, y = np.rint(truth[30]).astype(int)
     cv2.circle(image, (int(x) + 3, int(y) + 1), 5, 10, -1)
     rough = BoardMap.fit(at, truth[:CIRCLE], size, np.ones(CIRCLE))
-    corners = refine_corners(image, rough, TARGET)
+    corners = refine_corners(image, rough, chessboard_sites(TARGET))
     off = np.linalg.norm(corners.points_px - truth[:CIRCLE], axis=1)
     assert not corners.consistent[30]
     assert corners.consistent.sum() >= CIRCLE - 2

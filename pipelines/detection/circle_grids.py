@@ -1,0 +1,148 @@
+"""Grids of discs in an image: found by OpenCV, placed by us.
+
+A disc's darkness is summed over the pixels around it; their centroid is that of the disc's image, whatever the blur,
+as a point spread only spreads it. The centroid of a projected disc is not the projection of its centre: by how much it
+is off follows from the map from board to image, which is fitted to the centres.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from eposit.arrays import Array
+from pipelines.detection.board_map import BoardMap
+from pipelines.detection.consistency import Corners, drop_inconsistent
+from pipelines.detection.finders import Grey, textured_region
+from pipelines.detection.seen_points import SeenPoints
+from render.targets.circle_grid import CircleGrid
+
+LEAST_AREA_PX = 12.0
+ROUNDS = 3  # of a map through the centres, and centres through the map
+RIM_STEPS = 64
+CLEAR = 0.92  # of the way to the next disc's rim that a disc's window may reach
+LEAST_WHITE = 12  # pixels of the window that see white alone
+LEAST_NOISE = 1.0 / 12.0  # variance of rounding, grey levels^2
+START_LIMIT = 0.25  # spacings that a centroid may lie from where the map puts it
+
+
+def find_circle_grid(image: Grey, target: CircleGrid) -> SeenPoints | None:
+    """The centres of all discs in the target's order, as OpenCV sees them; None if it does not see the whole grid."""
+    region = textured_region(image)
+    part = np.ascontiguousarray(image[region.pixels])
+    shape = cv2.CALIB_CB_ASYMMETRIC_GRID if target.asymmetric else cv2.CALIB_CB_SYMMETRIC_GRID
+    size = target.columns, target.rows
+    for flags in (shape, shape | cv2.CALIB_CB_CLUSTERING):
+        found, centres = cv2.findCirclesGrid(part, size, flags=flags, blobDetector=_blob_detector(part.size))
+        if found:
+            grid = np.asarray(centres, np.float64).reshape(target.rows, target.columns, 2)
+            points = _upright(grid, target).reshape(-1, 2) + [region.x, region.y]
+            return SeenPoints(np.arange(len(points)), points, "circles")
+    return None
+
+
+def _blob_detector(pixels: int) -> cv2.SimpleBlobDetector:
+    parameters = cv2.SimpleBlobDetector.Params()
+    parameters.minArea, parameters.maxArea = LEAST_AREA_PX, pixels / 4.0
+    parameters.minDistBetweenBlobs = np.sqrt(LEAST_AREA_PX)
+    return cv2.SimpleBlobDetector.create(parameters)
+
+
+def _upright(grid: Array, target: CircleGrid) -> Array:
+    """Centres (rows, columns, 2) so that x to y turns as the image's axes do; x to the right where that is open."""
+    if target.asymmetric and target.tells_orientation:
+        return grid
+    ways = [grid, grid[::-1, ::-1]]
+    if grid.shape[0] == grid.shape[1] and not target.asymmetric:
+        ways += [np.rot90(grid), np.rot90(grid, 3)]
+    return max(ways, key=lambda way: float(_direction(way)[0]))
+
+
+def _direction(grid: Array) -> Array:
+    """(2,) unit vector of the image of the rows."""
+    along = grid[:, -1].mean(axis=0) - grid[:, 0].mean(axis=0)
+    return along / np.linalg.norm(along)
+
+
+class _Blob(NamedTuple):
+    """What a disc's window says; NaN where it says nothing."""
+
+    centroid: Array  # (2,) px
+    covariance: Array  # (2, 2) px^2
+    contrast: float  # between white and the disc's middle, grey levels
+
+
+def refine_circles(image: Grey, board: BoardMap, target: CircleGrid, unit_mm: float) -> Corners:
+    """The projected centres of all discs, from a first map."""
+    at, size = target.pattern_points / unit_mm, (image.shape[1], image.shape[0])
+    radius = 0.5 * target.diameter_mm / unit_mm
+    window = radius + CLEAR * (_nearest(at) - 2.0 * radius)
+    if target.margin_mm < 0.5 * target.spacing_mm:
+        window = min(window, radius + CLEAR * ((target.margin_mm + 0.5 * target.spacing_mm) / unit_mm - radius))
+    blobs = [_blob(image, board, place, radius, 0.5 * (radius + window)) for place in at]
+    centroids, covariance = np.stack([blob.centroid for blob in blobs]), np.stack([blob.covariance for blob in blobs])
+    good = np.all(np.isfinite(centroids), axis=1)
+    side = np.sqrt(np.abs(np.linalg.det(board.jacobian(at))))
+    good[good] = np.linalg.norm(centroids - board(at), axis=1)[good] < START_LIMIT * side[good]
+    nothing = Corners(centroids, covariance, good, float("nan"), float("nan"), board)
+    if 2 * np.sum(good) <= board.slopes(at).shape[-1]:
+        return Corners(centroids, covariance, np.zeros(len(at), bool), nothing.blur_px, nothing.contrast, board)
+    weights, points = np.where(good, 1.0, 0.0), centroids
+    for _ in range(ROUNDS):
+        points = centroids + _centre_offsets(board, at, radius)
+        board = BoardMap.fit(at, points, size, weights, board)
+    contrast = float(np.median([blob.contrast for blob, use in zip(blobs, good, strict=True) if use]))
+    covariance[~good] = np.eye(2)
+    return drop_inconsistent(Corners(points, covariance, good, float("nan"), contrast, board), at, size)
+
+
+def _nearest(at: Array) -> float:
+    """The least distance between two places."""
+    distance = np.linalg.norm(at[1:] - at[0], axis=1)
+    return float(distance.min())
+
+
+def _centre_offsets(board: BoardMap, at: Array, radius: float) -> Array:
+    """(n, 2) px from the centroid of each disc's image to the image of its centre."""
+    angle = np.arange(RIM_STEPS) * (2.0 * np.pi / RIM_STEPS)
+    rim = radius * np.stack((np.cos(angle), np.sin(angle)), axis=1)
+    places = (at[:, None] + rim).reshape(-1, 2)
+    p = board(places).reshape(len(at), RIM_STEPS, 2)
+    centre = board(at)
+    p = p - centre[:, None]
+    following = np.roll(p, -1, axis=1)
+    cross = p[..., 0] * following[..., 1] - p[..., 1] * following[..., 0]
+    return -np.einsum("ns,nsk->nk", cross, p + following) / (3.0 * cross.sum(axis=1))[:, None]
+
+
+def _blob(image: Grey, board: BoardMap, place: Array, radius: float, window: float) -> _Blob:
+    """Centroid of the darkness in a window about a disc. radius, window: in the board's unit."""
+    none = _Blob(np.full(2, np.nan), np.full((2, 2), np.nan), float("nan"))
+    centre, inverse = board(place), np.linalg.inv(board.jacobian(place))
+    reach = window / np.linalg.norm(inverse, axis=1).min() if np.all(np.isfinite(inverse)) else np.inf
+    extent = window * np.linalg.norm(np.linalg.inv(inverse), axis=1)
+    low, high = np.floor(centre - extent).astype(int), np.ceil(centre + extent).astype(int) + 1
+    if not np.isfinite(reach) or np.any(low < 0) or np.any(high > image.shape[::-1]):
+        return none
+    y, x = np.mgrid[low[1] : high[1], low[0] : high[0]]
+    offset = np.stack((x.ravel(), y.ravel()), axis=1) - centre
+    distance = np.linalg.norm(offset @ inverse.T, axis=1)
+    used = distance < window
+    offset, distance = offset[used], distance[used]
+    grey = image[low[1] : high[1], low[0] : high[0]].ravel()[used].astype(np.float64)
+    white = distance > 0.5 * (radius + window)
+    if np.sum(white) < LEAST_WHITE:
+        return none
+    plane = np.column_stack((np.ones(len(offset)), offset))
+    light = plane @ np.linalg.lstsq(plane[white], grey[white], rcond=None)[0]
+    noise = max(float(np.mean((grey - light)[white] ** 2)), LEAST_NOISE)
+    dark = 1.0 - grey / np.maximum(light, 1.0)
+    total = dark.sum()
+    middle = distance < 0.5 * radius
+    if total <= 0.0 or not np.any(middle):
+        return none
+    mean = dark @ offset / total
+    spread = (offset - mean) / np.maximum(light, 1.0)[:, None]
+    return _Blob(centre + mean, noise * spread.T @ spread / total**2, float(np.median((light - grey)[middle])))

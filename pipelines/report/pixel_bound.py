@@ -1,0 +1,67 @@
+"""Errors of poses over the pixels' Cramer-Rao bound."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from datasets.rows import POSITION_COLUMNS, QUATERNION_COLUMNS, pose_covariances, poses
+from datasets.store.dataset import Dataset
+from eposit.arrays import Array
+from eposit.pose import rotation_error_vector
+from pipelines.report.data import SETTING
+
+POSE = (*QUATERNION_COLUMNS, *POSITION_COLUMNS)
+COVERED = 1.96  # stated deviations that 95 % of normal errors stay within
+
+
+def bound_rows(dataset: Dataset) -> list[dict[str, Any]]:
+    """For each setting and camera the root mean square error over the bound, and how often stated intervals cover.
+
+    The error is that of six directions together: sqrt(e^T B^-1 e / 6) with B a frame's bound; 1 is the least that an
+    unbiased solver reaches. Empty where no bounds were computed.
+    """
+    if not dataset.shards("bounds"):
+        return []
+    bounds = dataset.read("bounds")
+    bound = dict(zip(bounds["frame_id"].to_pylist(), pose_covariances(bounds), strict=True))
+    frames = dataset.read("frames", ["frame_id", "camera_name", *POSE])
+    place = {frame: i for i, frame in enumerate(frames["frame_id"].to_pylist())}
+    estimates = dataset.read("estimates")
+    settings = [" ".join(key) for key in zip(*(estimates[name].to_pylist() for name in SETTING), strict=True)]
+    ids = estimates["frame_id"].to_pylist()
+    truth = poses(frames.take([place[frame] for frame in ids]))
+    found = poses(estimates)
+    error = np.hstack((rotation_error_vector(found.R, truth.R), found.t - truth.t))
+    camera = frames["camera_name"].to_pylist()
+    keys = [(setting, camera[place[frame]]) for setting, frame in zip(settings, ids, strict=True)]
+    squares = _squares(error, np.array([bound[frame] for frame in ids]))
+    inside = _inside(error, pose_covariances(estimates))
+    rows: list[dict[str, Any]] = []
+    for key in dict.fromkeys(keys):
+        own = np.array([other == key for other in keys]) & np.isfinite(squares)
+        if np.any(own):
+            over = float(np.sqrt(np.mean(squares[own])))
+            covered = float(np.mean(inside[own])) if np.all(np.isfinite(inside[own])) else None
+            rows.append({"setting": key[0], "camera": key[1], "n": int(own.sum()), "over": over, "covered": covered})
+    return rows
+
+
+def _squares(error: Array, bound: Array) -> Array:
+    """(n,) mean square of errors (n, 6) in units of bounds (n, 6, 6); NaN where either is missing."""
+    squares = np.full(len(error), np.nan)
+    known = np.all(np.isfinite(error), axis=1) & np.all(np.isfinite(bound), axis=(1, 2))
+    scale = np.sqrt(np.einsum("nii->ni", bound[known]))
+    scaled = error[known] / scale
+    correlation = bound[known] / (scale[:, :, None] * scale[:, None, :])
+    whitened = np.linalg.solve(correlation, scaled[..., None])[..., 0]
+    squares[known] = np.mean(scaled * whitened, axis=1)
+    return squares
+
+
+def _inside(error: Array, covariance: Array) -> Array:
+    """(n,) share of the six errors that are within COVERED stated deviations; NaN where none are stated."""
+    deviations = np.sqrt(np.einsum("nii->ni", covariance))
+    inside = np.mean(np.abs(error) <= COVERED * deviations, axis=1)
+    return np.where(np.all(np.isfinite(deviations), axis=1), inside, np.nan)
