@@ -11,13 +11,12 @@ import os
 import resource
 import shutil
 import subprocess
-import sys
 
 import pytest
 
 from datasets.recipe.model import load_recipe
 from pipelines.nightly.history import History
-from pipelines.nightly.other_code import PACKAGES, ROOT, RUN_COMMANDS
+from pipelines.nightly.other_code import PACKAGES, ROOT, RUN_COMMANDS, Code
 from tests.pipelines.nightly.studies import found
 from tests.pipelines.nightly.studies.pages import changes_page
 
@@ -44,9 +43,8 @@ def nights(tmp_path_factory):
 
 def _run(code, environment, *words):
     """Run a command of `nightly` by the code in a folder."""
-    arguments = [str(code), ",".join(PACKAGES), json.dumps([["nightly", *map(str, words)]])]
     return subprocess.run(
-        [sys.executable, "-c", RUN_COMMANDS, *arguments],
+        Code(code).command(RUN_COMMANDS, json.dumps([["nightly", *map(str, words)]])),
         env=os.environ | environment, capture_output=True, text=True, check=False,
     )  # fmt: skip
 
