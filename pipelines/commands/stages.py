@@ -35,16 +35,16 @@ def run(
     """Every stage: generate, detect, estimate, score, report."""
     from pipelines.stages import run as stages
     from pipelines.stages.kernels import compiled_ahead
-    from pipelines.stages.settings import RUN_SETTINGS, settings_of
+    from pipelines.stages.settings import run_settings, settings_of
 
     execution = _execution(engine, workers, ray_address, shard, quiet)
-    settings = [*RUN_SETTINGS, *settings_of(solver or [])]
+    more = settings_of(solver or [])
     shared, console = not execution.part.is_whole, execution.console
     with begin(recipe, out, regime, reuse, console, shared=shared, keep_masters=not no_masters) as dataset:
         with compiled_ahead(dataset, execution.part) as kernels:  # beside the first pictures
             stages.run_generate(dataset, execution)
             stages.run_detect(dataset, execution, kernels=kernels)
-        stages.run_estimate(dataset, settings, execution)
+        stages.run_estimate(dataset, [*run_settings(dataset.recipe.target), *more], execution)
         stages.run_score(dataset, execution)
         part = execution.part
         if part.is_whole:
