@@ -37,10 +37,10 @@ def run(
     from pipelines.stages import run as stages
     from pipelines.stages.estimate_images import OWN_SYSTEMS, find_estimator
     from pipelines.stages.kernels import compiled_ahead
-    from pipelines.stages.settings import RUN_SETTINGS, System, settings_of
+    from pipelines.stages.settings import System, run_settings, settings_of
 
     execution = _execution(engine, workers, ray_address, shard, quiet)
-    settings, systems = [*RUN_SETTINGS, *settings_of(solver or [])], estimator or []
+    more, systems = settings_of(solver or []), estimator or []
     for name in systems:
         find_estimator(name)
     shared, console = not execution.part.is_whole, execution.console
@@ -48,7 +48,7 @@ def run(
         with compiled_ahead(dataset, execution.part) as kernels:  # beside the first pictures
             stages.run_generate(dataset, execution)
             stages.run_detect(dataset, execution, kernels=kernels)
-        stages.run_estimate(dataset, settings, execution)
+        stages.run_estimate(dataset, [*run_settings(dataset.recipe.target), *more], execution)
         for name in systems:
             stages.run_system(dataset, System(name), execution)
         if any(name in OWN_SYSTEMS for name in systems):

@@ -65,7 +65,7 @@ def detect_points(image: Grey, target: AnyTarget, detector: str = Detector.EDGE_
     if detector not in list(Detector):
         raise ValueError(f"unknown detector {detector!r}; choose one of {', '.join(Detector)}")
     if not takes_target(detector, target):
-        raise ValueError(f"detector {detector!r} finds chessboards only; choose another for {target.pattern!r}")
+        raise ValueError(f"detector {str(detector)!r} finds chessboards only; choose another for {target.pattern!r}")
     if isinstance(target, Chessboard):
         return _detect_chessboard(image, target, detector)
     return _detect_printed(image, target, detector)

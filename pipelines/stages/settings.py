@@ -13,6 +13,7 @@ from eposit import Camera
 from pipelines.adapters.registry import check_solver, find_solver, takes_four
 from pipelines.adapters.user import file_name
 from pipelines.detection import Detector, takes_target
+from render.targets.chessboard import Chessboard
 from render.targets.kinds import AnyTarget
 
 POINTS = ("detected", "truth", "truth+noise")
@@ -122,6 +123,11 @@ RUN_SETTINGS = (
     Setting(solver="eposit", use="four"),
     Setting(solver="eposit", use="four", camera="nominal"),
 )
+
+
+def run_settings(target: AnyTarget) -> list[Setting]:
+    """`RUN_SETTINGS`, but for a flat target's four points, from which the paper's way has no pose."""
+    return [setting for setting in RUN_SETTINGS if setting.use == ALL or isinstance(target, Chessboard)]
 
 
 def settings_of(solvers: Iterable[str]) -> list[Setting]:

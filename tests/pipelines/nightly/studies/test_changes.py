@@ -11,6 +11,7 @@ import os
 import resource
 import shutil
 import subprocess
+import sys
 
 import pytest
 
