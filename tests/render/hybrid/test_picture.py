@@ -25,8 +25,8 @@ def pose(tilt=25.0, depth=800.0):
     return Pose(R, np.array([30.0, -20.0, depth]) - R @ TARGET.board_centre)
 
 
-def scene_of(**keys):
-    world = World(method="hybrid", bake_samples=8, **keys)
+def scene_of(bake_samples=8, **keys):
+    world = World(method="hybrid", bake_samples=bake_samples, **keys)
     draw = draw_world(world, np.random.default_rng(4))
     return hybrid_scene(world, draw, TARGET, LIGHT, baked_light(world, draw, TARGET, LIGHT))
 
@@ -37,12 +37,14 @@ def room():
 
 
 def test_in_the_studio_a_matt_board_is_that_of_the_closed_form():
-    ours = scene_of(path_depth=2).region(CAMERA, pose(), target_region(TARGET, CAMERA, pose()), cells=CELLS, seed=SEED)
+    near = target_region(TARGET, CAMERA, pose())
+    ours = scene_of(bake_samples=64, path_depth=2).region(CAMERA, pose(), near, cells=CELLS, seed=SEED)
     closed = render_frame(TARGET, LIGHT, CAMERA, pose(), samples=CELLS).radiance
     grey = 204.0 * (ours.mean(axis=2) - closed)
-    assert abs(grey.mean()) < 0.3  # the bake's noise, which all pixels share: 0.1 %
-    assert np.sqrt(np.mean(grey**2)) < 2.0  # one per cent in each texel
-    assert np.abs(grey).max() < 12.0
+    # 64 rays a texel leave a per cent in the average of some texels, and more around the circle.
+    assert abs(grey.mean()) < 0.3
+    assert np.sqrt(np.mean(grey**2)) < 2.0
+    assert np.quantile(np.abs(grey), 0.99) < 7.0
 
 
 def test_a_region_has_the_bits_of_the_whole_picture(room):
