@@ -45,13 +45,13 @@ def bound_table(rows: list[dict[str, Any]]) -> Table:
         tuple(
             (
                 row["setting"], row["camera"], str(row["n"]), f"{row['over']:.2f}",
-                "–" if row["covered"] is None else f"{100.0 * row['covered']:.0f} %",
+                "-" if row["covered"] is None else f"{100.0 * row['covered']:.0f} %",
             )
             for row in rows
         ),
-        "The six pose errors together in units of the least that any unbiased solver reaches on the frame's pixels with "
-        "the light unknown (Cramer-Rao); 1 is the best there is. Covered: errors within 1.96 stated deviations, of which "
-        "95 % is honest. Frames that failed are left out.",
+        "The six pose errors together in units of the least that any unbiased solver reaches on the frame's pixels "
+        "with the light unknown (Cramer-Rao); 1 is the best there is. Covered: errors within 1.96 stated deviations, "
+        "of which 95 % is honest. Frames that failed are left out.",
     )  # fmt: skip
 
 
