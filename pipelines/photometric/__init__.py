@@ -21,18 +21,22 @@ from eposit import Camera, Status
 from pipelines.adapters.results import PoseResult
 from pipelines.detection import PointStatus, detect_points
 from pipelines.photometric.refine import refine
+from render.targets import Target
 from render.targets.chessboard import Chessboard
 
+UNSUPPORTED_TARGET = "unsupported_target"  # status of targets other than the chessboard with its circle
 LEAST_POINTS = 4  # that a pose needs
 SEPARATOR = ", "  # between the reasons of several points
 
 
-def estimate(image: NDArray[np.uint8], camera: Camera, target: Chessboard) -> PoseResult:
+def estimate(image: NDArray[np.uint8], camera: Camera, target: Target) -> PoseResult:
     """The pose of the target in an 8-bit image (height, width).
 
     Failures are a status: what detection says where it leaves too few points, that of the corner-based solver, or
     those of `refine`.
     """
+    if not isinstance(target, Chessboard):
+        return PoseResult(UNSUPPORTED_TARGET)
     found = detect_points(image, target)
     good = found.status == PointStatus.OK
     if np.sum(good) < LEAST_POINTS:

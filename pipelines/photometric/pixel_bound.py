@@ -22,6 +22,7 @@ from pipelines.photometric.normal_equations import solve
 from pipelines.photometric.picture import Modelled, PictureModel, Shape
 from pipelines.photometric.point_spread import LEAST_SIGMA_PX, PointSpread
 from render.analytic.even_light import pixel_shares
+from render.colour import luminance
 from render.frame import LinearImage
 from render.region import Image
 from render.sensor.develop import MAX_GREY, FrameContext, develop
@@ -62,7 +63,8 @@ def _expected(model: PictureModel, linear: LinearImage, sensor: SensorModel, fra
     """The expected picture before the tone curve, 255 for full scale, and its derivatives."""
     crop = model.region.pixels
     scale = np.float32(MAX_GREY * sensor.exposure) * _fall_of_light(sensor, frame)[crop]
-    lit = linear.full(frame.camera)[crop] * scale
+    full = linear.full(frame.camera)
+    lit = (luminance(full) if linear.in_colour else full)[crop] * scale
     shares = pixel_shares(model.target, model.camera, frame.cam_from_obj, model.region)
     lit, white, target = (_defocused(image, sensor.defocus_radius_px) for image in (lit, *shares))
     spread = PointSpread.of(max(sensor.psf_sigma_px, LEAST_SIGMA_PX))

@@ -17,6 +17,7 @@ from pipelines.photometric.image_flow import POSE
 from pipelines.photometric.pixel_bound import pixel_bound
 from pipelines.stages.generate import linear_light
 from render.sensor.develop import FrameContext
+from render.targets.chessboard import Chessboard
 
 
 def is_done(dataset: Dataset, index: int) -> bool:
@@ -35,8 +36,11 @@ def run_shard(dataset: Dataset, index: int, advance: Callable[[], None] = lambda
 
 
 def _bound(dataset: Dataset, frame: Frame) -> Array:
-    """(6, 6), NaN where the pixels do not determine the pose."""
-    linear, target, camera = linear_light(dataset, frame), dataset.recipe.chessboard(), frame.camera.true_camera()
+    """(6, 6), NaN where the pixels do not determine the pose, and for targets other than the chessboard."""
+    target, camera = dataset.recipe.target, frame.camera.true_camera()
+    if not isinstance(target, Chessboard):
+        return np.full((POSE, POSE), np.nan)
+    linear = linear_light(dataset, frame)
     context = FrameContext(target, camera, frame.cam_from_obj, frame.rate, linear.region, frame.sensor_seed)
     try:
         return pixel_bound(linear, frame.sensor, context)

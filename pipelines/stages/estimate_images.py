@@ -52,8 +52,7 @@ def run_shard(
 
     The function is called once for each image, (h, w) grey values. advance: called after each frame.
     """
-    recipe = dataset.recipe
-    function, target = find_estimator(system.name), recipe.chessboard() if system.name in OWN_SYSTEMS else recipe.target
+    function, target = find_estimator(system.name), dataset.recipe.target
     path = dataset.shard_path("frames", index, shard_count(dataset.recipe))
     answers: list[PoseResult] = []
     notes: list[str] = []
