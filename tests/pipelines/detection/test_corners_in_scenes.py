@@ -120,6 +120,7 @@ def test_corners_in_scenes():
                 costs.append(cost_row(name, lens, scene, (rms(errors), seconds, bake_s)))
                 print(costs[-1][0], flush=True)
                 faults += [costs[-1][0]] if costs[-1][1] < GAIN else []
+        PLACE.parent.mkdir(exist_ok=True)
         PLACE.write_text(page(rows, [row for row, _ in costs]))
     assert not faults
 

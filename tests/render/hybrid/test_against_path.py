@@ -68,6 +68,7 @@ def test_hybrid_against_path():
         bakes = [replace(first, seed=first.seed + i).bake(TARGET) for i in range(BAKES)]
         scenes = [hybrid_scene.__wrapped__(world, draw, TARGET, LIGHT, baked) for baked in bakes]
         rows += scene_rows(name, {lens: pictures(scenes, lens) for lens in LENSES}, faults)
+        PLACE.parent.mkdir(exist_ok=True)
         PLACE.write_text(page(rows))
     assert not faults
 
