@@ -28,6 +28,7 @@ from render.region import Image
 from render.sensor.develop import MAX_GREY, FrameContext, develop
 from render.sensor.optics import disc_kernel
 from render.sensor.presets import SensorModel
+from render.targets.chessboard import Chessboard
 
 ROUNDING = 1.0 / 12.0  # variance of rounding to whole grey values
 GAIN_EXPOSURE = 0.5  # at which the light's fall is read from a developed white picture, free of clipping
@@ -42,8 +43,10 @@ def pixel_bound(linear: LinearImage, sensor: SensorModel, frame: FrameContext) -
 
     Raises:
         numpy.linalg.LinAlgError: the pixels do not determine the pose.
-        ValueError: the target has no image in the picture.
+        ValueError: the target has no image in the picture, or is not the chessboard with its circle.
     """
+    if not isinstance(frame.target, Chessboard):
+        raise ValueError(f"the pixels' bound is for the chessboard with its circle, not {type(frame.target).__name__}")
     sigma = max(sensor.psf_sigma_px, LEAST_SIGMA_PX)
     model = PictureModel.around(frame.target, frame.camera, Shape(frame.cam_from_obj, sigma), circle=True)
     return solve(true_sums(model, linear, sensor, frame), model.grid, model.dark()).covariance[:POSE, :POSE]
@@ -64,7 +67,7 @@ def _expected(model: PictureModel, linear: LinearImage, sensor: SensorModel, fra
     crop = model.region.pixels
     scale = np.float32(MAX_GREY * sensor.exposure) * _fall_of_light(sensor, frame)[crop]
     full = linear.full(frame.camera)
-    lit = (luminance(full) if linear.in_colour else full)[crop] * scale
+    lit = ((luminance(full) if linear.in_colour else full)[crop] * scale).astype(np.float32, copy=False)
     shares = pixel_shares(model.target, model.camera, frame.cam_from_obj, model.region)
     lit, white, target = (_defocused(image, sensor.defocus_radius_px) for image in (lit, *shares))
     spread = PointSpread.of(max(sensor.psf_sigma_px, LEAST_SIGMA_PX))
