@@ -89,7 +89,7 @@ def test_four_is_refused_for_a_target_without_a_circle():
 def test_a_pose_that_shows_a_bent_board_from_behind_is_refused():
     steep = TEXT.replace("tilt_range_deg = [0, 45]", "tilt_range_deg = [80, 80]").replace("count = 8", "count = 1")
     assert len(plan(parse_recipe(steep, "r"))) == 3
-    bent = steep.replace('dictionary = "5X5_50"', 'dictionary = "5X5_50"\nbend_sag_mm = -74.0\nbend_axis = "both"')
+    bent = steep.replace('dictionary = "5X5_50"', 'dictionary = "5X5_50"\nbend_sag_mm = 74.0\nbend_axis = "both"')
     with pytest.raises(UserError, match="none of 2000 random poses"):
         plan(parse_recipe(bent, "r"))
 
