@@ -105,10 +105,12 @@ class BoardMap:
 
 
 def _in_space(at: Array, height: float, lift: Lift | None) -> Array:
-    """(3, m) x, y, z of (m, 2) places in squares, `height` squares above a flat board."""
-    if lift is not None:
-        return np.ascontiguousarray(lift(at).T)
-    return np.vstack((at.T, np.full(len(at), -height)))
+    """(3, m) x, y, z of (m, 2) places in squares, `height` squares above a flat board.
+
+    Row by row in memory: compiled functions are compiled anew for every other layout.
+    """
+    places = lift(at).T if lift is not None else np.vstack((at.T, np.full(len(at), -height)))
+    return np.ascontiguousarray(places)
 
 
 def grid(inner: tuple[int, int]) -> Array:

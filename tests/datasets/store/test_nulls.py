@@ -9,9 +9,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from datasets.rows import numbers, pose_covariances
-from datasets.schema import ESTIMATES, TABLES
+from datasets.schema import ESTIMATES
 from datasets.store.images import encode_png
 from datasets.store.nulls import with_nans, with_nulls
+from tests.tables import OF_A_RUN
 from tests.wrong_input import put_image
 
 LIST = ESTIMATES.field("covariance").type
@@ -59,7 +60,7 @@ def test_averages_of_a_dataset_with_failures_are_numbers(place, cli):
         assert cli(*words, root, "-q").code == 0
     scores = pq.read_table(root / "scores")
     assert sorted(scores["status"].to_pylist()) == ["ok", "points_missing"]
-    for name in TABLES:
+    for name in OF_A_RUN:
         table = pq.read_table(root / name)
         for column, field in zip(table.columns, table.schema, strict=True):
             if pa.types.is_floating(field.type):

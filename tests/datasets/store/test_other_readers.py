@@ -16,10 +16,11 @@ import pytest
 import yaml
 
 from datasets.rows import decode_image, numbers
-from datasets.schema import TABLES, meanings
+from datasets.schema import meanings
 from datasets.store.dataset import open_dataset
 from datasets.store.images import encode_png
 from tests import other_readers
+from tests.tables import OF_A_RUN
 from tests.wrong_input import put_image
 
 PACKAGES = ("datasets", "duckdb", "pandas", "pillow", "polars", "pyarrow")
@@ -42,7 +43,7 @@ def front_matter(root):
 
 def test_the_card_names_the_files_of_each_table(with_failure, cli, place):
     configs = front_matter(with_failure)
-    assert [config["config_name"] for config in configs] == list(TABLES)
+    assert [config["config_name"] for config in configs] == list(OF_A_RUN)
     assert [config["config_name"] for config in configs if config.get("default")] == ["frames"]
     for config in configs:
         assert set(with_failure.glob(config["data_files"])) == set((with_failure / config["config_name"]).iterdir())
@@ -50,11 +51,11 @@ def test_the_card_names_the_files_of_each_table(with_failure, cli, place):
     assert [config["config_name"] for config in front_matter(place.new())] == ["frames", "keypoints"]
 
 
-@pytest.mark.parametrize("table", TABLES)
+@pytest.mark.parametrize("table", OF_A_RUN)
 def test_every_shard_tells_what_it_holds(table, tiny):
     for path in (tiny[1] / table).iterdir():
         footer = pq.read_schema(path).metadata
-        assert json.loads(footer[b"meanings"]) == meanings(TABLES[table])
+        assert json.loads(footer[b"meanings"]) == meanings(OF_A_RUN[table])
         assert all(json.loads(footer[b"meanings"]).values())
         features = json.loads(footer.get(b"huggingface", '{"info": {"features": {}}}'))["info"]["features"]
         assert features == ({"image": {"_type": "Image"}} if table == "frames" else {})

@@ -10,10 +10,10 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
 
-from datasets.schema import TABLES
 from datasets.store.dataset import open_dataset
 from datasets.store.images import encode_png
 from tests.old_dataset import NEW, make_old
+from tests.tables import OF_A_RUN
 from tests.wrong_input import assert_one_sentence, files, first, put_image
 
 UNSUPPORTED = "has schema version 9, and this program reads 2 and 3; use the program that wrote it"
@@ -40,7 +40,7 @@ def test_rows_are_those_of_today(both):
     new, old = map(open_dataset, both)
     assert np.isnan(pq.read_table(new.root / "scores")["rotation_error_deg"].to_numpy()).any()
     assert pq.read_table(old.root / "scores")["rotation_error_deg"].null_count == 0
-    for table, schema in TABLES.items():
+    for table, schema in OF_A_RUN.items():
         rows = old.read(table)
         assert rows.schema.equals(schema)
         same = [name for name in schema.names if not (table == "scores" and name in NEW)]
@@ -136,7 +136,7 @@ def test_a_recipe_that_relied_on_the_old_default_goes_on(old_default, cli, tmp_p
     assert len(shards(tmp_path / "begun")) == 4
 
 
-@pytest.mark.parametrize("table", TABLES)
+@pytest.mark.parametrize("table", OF_A_RUN)
 def test_a_version_that_is_not_known_is_one_sentence_and_stays(table, place, cli):
     root = place.dataset()
     path = first(root, table)
