@@ -87,7 +87,7 @@ def _off(pool, moves, steps):
         if names:
             worst = np.max([np.abs(after.values[name] - before.values[name]) for name in names], axis=0)
             off.setdefault(after.system, []).append(worst)
-    return {system: [float(np.median(np.hstack(of))), float(np.max(of))] for system, of in off.items()}
+    return {system: [float(np.nanmedian(np.hstack(of))), float(np.nanmax(np.hstack(of)))] for system, of in off.items()}
 
 
 @pytest.mark.slow

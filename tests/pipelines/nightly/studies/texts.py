@@ -52,9 +52,6 @@ Whole nights of the product on real pictures, 20 poses and five lenses in the re
 developed, detected, solved, scored, judged, with the baseline's code in a process of its own. Each history has
 its own pinned pictures; fresh views have seeds of their own. `speed` ran where detection is slower; it fails
 above {LARGEST_RATIO}.
-
-In the first history gate `speed` still judged by four pairs of turns, and missed the slower detection while some
-twenty processes shared two cores; since then the gate takes more turns where times scatter.
 """
 QUIET = """
 # Nights without a fault are quiet
@@ -71,9 +68,6 @@ Whole nights of the product with new seeds and the same code. On the same pictur
 no difference at all: not a number of a frame is another. So only processor time can scatter; the last column
 has its ratio to the baseline's, over all nights. The machine was shared, which the interleaved turns have to
 stand.
-
-In the four nights of the first history gate `speed` still judged by four pairs of turns. One of them failed with
-1.11 while some twenty processes shared two cores; since then the gate takes more turns where times scatter.
 """
 SCATTER = """
 What the simulated nights scatter with, from the pool: for each metric the mean over lenses and poses, its
