@@ -20,7 +20,7 @@ from render.sensor.optics import disc_kernel, natural_falloff, vignetting_gain
 from render.sensor.presets import SensorModel, regime_of, regimes
 from render.targets.chessboard import Chessboard
 from render.targets.image_region import Region
-from tests.cameras import KB, RADIUS
+from tests.cameras import COEFFICIENTS, RADIUS
 
 TARGET = Chessboard()
 CAMERA = Camera(lens="perspective", fx=400.0, fy=400.0, cx=199.5, cy=149.5, width=400, height=300)
@@ -88,9 +88,10 @@ FALL_OFF = {  # of a flat pupil of fixed size, over the incidence angle, rad
 
 
 def lens_camera(lens):
-    """A camera whose corner lies at 75 degrees, that of an orthogonal lens beyond its rim."""
-    f = 249.0 / (0.95 if lens == "orthogonal" else RADIUS[lens](np.deg2rad(75.0)))
-    k = KB if lens == "kannala_brandt" else ()
+    """A camera whose corner lies at 75 degrees, of a distorted pinhole at 45; that of an orthogonal lens is dark."""
+    corner = np.deg2rad(45.0 if lens == "pinhole_radial" else 75.0)
+    f = 249.0 / (0.95 if lens == "orthogonal" else RADIUS[lens](corner))
+    k = COEFFICIENTS.get(lens, ())
     return CAMERA.replace(lens=lens, fx=f, fy=1.02 * f, cx=195.3, cy=152.1, coefficients=k)
 
 
