@@ -16,6 +16,7 @@ from datasets.store.images import decode_png
 from datasets.store.nulls import with_nans
 from eposit import Camera, Pose, Solution
 from eposit.arrays import Array
+from eposit.lens import COEFFICIENTS
 from render.targets import Target
 
 LEAST_SIDE_PX = 16
@@ -85,7 +86,8 @@ def pose_covariances(rows: pa.Table) -> Array:
 
 def camera_of(row: dict[str, Any]) -> Camera:
     """The true camera of a row of `frames`."""
-    coefficients = tuple(row[f"k{i}"] for i in range(1, 5)) if row["lens"] == "kannala_brandt" else ()
+    names, _ = COEFFICIENTS.get(row["lens"], ((), ""))
+    coefficients = tuple(row[f"k{i}"] for i in range(1, 1 + len(names)))
     return Camera(
         lens=row["lens"],
         **{name: row[f"{name}_px"] for name in ("fx", "fy", "cx", "cy", "width", "height")},

@@ -7,6 +7,7 @@ from typing import get_type_hints
 
 import pyarrow as pa
 
+from eposit.calibrated_lens import MOST_COEFFICIENTS
 from render.world import WorldDraw
 
 SCHEMA_VERSION = "3"
@@ -69,7 +70,7 @@ FRAMES = pa.schema(
                 "fy_px": "true focal length along y",
                 "cx_px": "true principal point, pixel centres at integers",
                 "cy_px": "true principal point, pixel centres at integers",
-                **{f"k{i}": f"coefficient {i} of kannala_brandt, else 0" for i in range(1, 5)},
+                **{f"k{i}": f"coefficient {i} of the lens, 0 if it has fewer" for i in range(1, 1 + MOST_COEFFICIENTS)},
                 "nominal_f_px": "focal length that a user without calibration assumes",
                 "tilt_deg": "angle between the board's normal and the optical axis",
             }

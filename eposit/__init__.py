@@ -5,12 +5,14 @@
 # four 30.
 from eposit import gpnpf, opnp, pnpfr, released
 from eposit.camera import Camera
-from eposit.lens import LENS_NAMES, Lens, get_lens
+from eposit.lens import COEFFICIENTS, LENS_NAMES, get_lens
+from eposit.lens_law import Lens
 from eposit.pose import Pose
 from eposit.solution import Solution, Status
 from eposit.solver import METHODS, solve
 
 __all__ = [
+    "COEFFICIENTS",
     "LENS_NAMES",
     "METHODS",
     "Camera",

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from eposit.arrays import Array, Mask
-from eposit.lens import Lens, get_lens
+from eposit.lens import get_lens
+from eposit.lens_law import Lens
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,7 +28,7 @@ class Camera:
     cy: float  # principal point, px
     width: int  # image width, px
     height: int  # image height, px
-    coefficients: tuple[float, ...] = ()  # k1..k4 of Kannala-Brandt, empty for the other lenses
+    coefficients: tuple[float, ...] = ()  # in the order of eposit.COEFFICIENTS; none for the paper's lenses
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "coefficients", tuple(float(k) for k in self.coefficients))
@@ -59,7 +60,7 @@ class Camera:
         Raises:
             ValueError: the last axis is not 3.
         Source:
-            Paper, equations 1 to 5; Kannala and Brandt 2006 for the polynomial.
+            Paper, equations 1 to 5; `eposit.calibrated_lens` for lenses with coefficients.
         """
         points = _last_axis(points_in_cam, 3, "points_in_cam")
         x, y, z = np.moveaxis(points, -1, 0)

@@ -11,12 +11,13 @@ from typing import NamedTuple
 import numpy as np
 
 from eposit import get_lens
-from eposit.lens import KANNALA_BRANDT
+from eposit.calibrated_lens import DOUBLE_SPHERE, EUCM, KANNALA_BRANDT, PINHOLE_RADIAL
 from render import backend
 from render.device import DeviceFloat
 
 INVERSION_STEPS = 24  # Newton steps inside a bracket; float32 needs about 6, a flat slope at the rim more
 NO_IMAGE_CIRCLE = 1e30
+FAR_TANGENT = 1e4  # beyond what a picture shows
 MIN_COSINE = 0.02  # at the rim of an orthogonal lens theta's slope is infinite: over a cell of 0.2 px it is 1 / 0.02
 
 
@@ -25,9 +26,9 @@ class DeviceLens:
     """A lens law with its numbers as opaque Dr.Jit scalars, so that one kernel serves all cameras of a lens."""
 
     name: str
-    coefficients: list[DeviceFloat]  # k1 to k4 of kannala_brandt, else none
+    coefficients: list[DeviceFloat]  # in the order of eposit.COEFFICIENTS
     rho_max: DeviceFloat  # normalised radius of the image circle
-    theta_max: DeviceFloat  # rad
+    argument_max: DeviceFloat  # theta at the rim, rad; of pinhole_radial its tangent
 
 
 class IncidenceAngle(NamedTuple):
@@ -43,7 +44,8 @@ def device_lens(name: str, coefficients: tuple[float, ...]) -> DeviceLens:
     mi, dr = backend.load(), backend.jit()
     law = get_lens(name, coefficients)
     circle = law.rho_max if np.isfinite(law.rho_max) else NO_IMAGE_CIRCLE
-    numbers = [dr.opaque(mi.Float, value) for value in (*coefficients, circle, law.theta_max)]
+    at_rim = law.theta_max if name != PINHOLE_RADIAL else min(float(np.tan(law.theta_max)), FAR_TANGENT)
+    numbers = [dr.opaque(mi.Float, value) for value in (*coefficients, circle, at_rim)]
     return DeviceLens(law.name, numbers[:-2], numbers[-2], numbers[-1])
 
 
@@ -66,23 +68,73 @@ def incidence_angle(law: DeviceLens, rho: DeviceFloat) -> IncidenceAngle:
     if law.name == "stereographic":  # half is tan(theta / 2)
         scale = 1.0 / (1.0 + half * half)
         return IncidenceAngle(2.0 * half * scale, (1.0 - half) * (1.0 + half) * scale, scale)
-    assert law.name == KANNALA_BRANDT
-    theta, slope = _invert_polynomial(law, rho)
-    sine, cosine = dr.sincos(theta)
+    return _CALIBRATED[law.name](law, rho)
+
+
+def _kannala_brandt(law: DeviceLens, rho: DeviceFloat) -> IncidenceAngle:
+    theta, slope = _invert_polynomial(law, rho, rho)
+    sine, cosine = backend.jit().sincos(theta)
     return IncidenceAngle(sine, cosine, 1.0 / slope)
 
 
-def _invert_polynomial(law: DeviceLens, rho: DeviceFloat) -> tuple[DeviceFloat, DeviceFloat]:
-    """theta of the Kannala-Brandt polynomial and d rho / d theta: Newton's method kept inside a shrinking bracket."""
+def _pinhole_radial(law: DeviceLens, rho: DeviceFloat) -> IncidenceAngle:
+    dr = backend.jit()
+    start = rho  # far out a power of the tangent outweighs the others
+    for power, k in zip((3, 5, 7), law.coefficients, strict=True):
+        start = dr.select(k > 0.0, dr.minimum(start, dr.power(rho / k, 1.0 / power)), start)
+    tangent, slope = _invert_polynomial(law, rho, start)
+    cosine = dr.rsqrt(1.0 + tangent * tangent)
+    return IncidenceAngle(tangent * cosine, cosine, cosine * cosine / slope)
+
+
+def _eucm(law: DeviceLens, rho: DeviceFloat) -> IncidenceAngle:
+    """Khomutenko et al. 2016; the slope is that of `eposit.calibrated_lens`, with the ray's scale for its g."""
+    dr = backend.jit()
+    alpha, beta = law.coefficients
+    square = beta * rho * rho
+    root = dr.safe_sqrt(1.0 - (2.0 * alpha - 1.0) * square)
+    z = (1.0 - alpha * alpha * square) / (alpha * root + 1.0 - alpha)
+    scale = dr.rsqrt(rho * rho + z * z)
+    sine, cosine = rho * scale, z * scale
+    rise = alpha * cosine * dr.rsqrt(beta * sine * sine + cosine * cosine) + 1.0 - alpha
+    return IncidenceAngle(sine, cosine, scale * scale / dr.maximum(rise, MIN_COSINE))
+
+
+def _double_sphere(law: DeviceLens, rho: DeviceFloat) -> IncidenceAngle:
+    """Usenko et al. 2018; the slope is that of `eposit.calibrated_lens`, with the ray's scale for its g."""
+    dr = backend.jit()
+    xi, alpha = law.coefficients
+    square = rho * rho
+    root = dr.safe_sqrt(1.0 - (2.0 * alpha - 1.0) * square)
+    z = (1.0 - alpha * alpha * square) / (alpha * root + 1.0 - alpha)
+    scale = (z * xi + dr.sqrt(z * z + (1.0 - xi * xi) * square)) / (z * z + square)
+    sine, cosine = rho * scale, z * scale - xi
+    k = z * scale
+    rise = (1.0 + xi * cosine) * (alpha * k * dr.rsqrt(sine * sine + k * k) + 1.0 - alpha)
+    return IncidenceAngle(sine, cosine, scale * scale / dr.maximum(rise, MIN_COSINE))
+
+
+_CALIBRATED = {
+    KANNALA_BRANDT: _kannala_brandt,
+    PINHOLE_RADIAL: _pinhole_radial,
+    EUCM: _eucm,
+    DOUBLE_SPHERE: _double_sphere,
+}
+
+
+def _invert_polynomial(
+    law: DeviceLens, value_sought: DeviceFloat, start: DeviceFloat
+) -> tuple[DeviceFloat, DeviceFloat]:
+    """Argument and slope of an odd polynomial where it has a value: Newton's method kept inside a shrinking bracket."""
     mi, dr = backend.load(), backend.jit()
-    k1, k2, k3, k4 = law.coefficients
-    low, high = mi.Float(0.0), mi.Float(law.theta_max)
-    theta, slope = dr.minimum(rho, law.theta_max), mi.Float(1.0)
+    k1, k2, k3, k4 = (*law.coefficients, 0.0)[:4]
+    low, high = mi.Float(0.0), mi.Float(law.argument_max)
+    theta, slope = dr.minimum(start, law.argument_max), mi.Float(1.0)
     for _ in range(INVERSION_STEPS):
         t2 = theta * theta
         value = theta * (1.0 + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4))))
         slope = 1.0 + t2 * (3.0 * k1 + t2 * (5.0 * k2 + t2 * (7.0 * k3 + t2 * 9.0 * k4)))
-        excess = value - rho
+        excess = value - value_sought
         low, high = dr.select(excess < 0.0, theta, low), dr.select(excess >= 0.0, theta, high)
         proposal = theta - excess / slope
         theta = dr.select((proposal >= low) & (proposal <= high), proposal, 0.5 * (low + high))

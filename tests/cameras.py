@@ -8,6 +8,13 @@ from scipy.spatial.transform import Rotation
 from eposit import LENS_NAMES, Camera, Pose
 
 KB = (-0.04, 0.003, -0.0004, 0.00002)
+# Barrel and pincushion of a wide pinhole lens, and fish-eye lenses of about 130 degrees; in the order of each lens.
+COEFFICIENTS = {
+    "kannala_brandt": KB,
+    "pinhole_radial": (-0.28, 0.12, 0.02),
+    "eucm": (0.6, 1.1),
+    "double_sphere": (-0.2, 0.6),
+}
 PAPER_FISHEYE = {"fx": 552.39, "fy": 552.69, "cx": 782.41, "cy": 613.71}
 PAPER_PINHOLE = {"fx": 1378.65, "fy": 1381.37, "cx": 807.41, "cy": 602.47}
 # The paper's simulated object, mm.
@@ -20,14 +27,20 @@ RADIUS = {
     "equisolid": lambda a: 2 * np.sin(a / 2),
     "orthogonal": np.sin,
     "kannala_brandt": lambda a: a * (1 + KB[0] * a**2 + KB[1] * a**4 + KB[2] * a**6 + KB[3] * a**8),
+    "pinhole_radial": lambda a: np.tan(a) * (1 - 0.28 * np.tan(a) ** 2 + 0.12 * np.tan(a) ** 4 + 0.02 * np.tan(a) ** 6),
+    "eucm": lambda a: np.sin(a) / (0.6 * np.sqrt(1.1 * np.sin(a) ** 2 + np.cos(a) ** 2) + 0.4 * np.cos(a)),
+    "double_sphere": lambda a: (
+        np.sin(a) / (0.6 * np.sqrt(np.sin(a) ** 2 + (np.cos(a) - 0.2) ** 2) + 0.4 * (np.cos(a) - 0.2))
+    ),
 }
-PAST_90 = {"stereographic", "equidistance", "equisolid", "kannala_brandt"}
+PAST_90 = {"stereographic", "equidistance", "equisolid", "kannala_brandt", "eucm", "double_sphere"}
+PINHOLES = {"perspective", "pinhole_radial"}
 
 
 def paper_camera(lens: str) -> Camera:
     """The paper's pinhole or fish-eye intrinsics with a lens law."""
-    intrinsics = PAPER_PINHOLE if lens == "perspective" else PAPER_FISHEYE
-    return Camera(lens=lens, **intrinsics, width=1600, height=1200, coefficients=KB if lens == "kannala_brandt" else ())
+    intrinsics = PAPER_PINHOLE if lens in PINHOLES else PAPER_FISHEYE
+    return Camera(lens=lens, **intrinsics, width=1600, height=1200, coefficients=COEFFICIENTS.get(lens, ()))
 
 
 ALL_CAMERAS = [paper_camera(lens) for lens in LENS_NAMES]

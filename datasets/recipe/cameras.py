@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from eposit import Camera
-from eposit.lens import LENS_NAMES
+from eposit.lens import LENS_NAMES, coefficients_text
 
 MAX_PIXELS = 100_000_000
 LEAST_FOCAL_PX, MOST_FOCAL_PX = 1.0, 1e6
@@ -24,7 +24,7 @@ class CameraSpec:
     cy: Annotated[float, "true principal point, px"]
     width: Annotated[int, "image width, px"] = 1600
     height: Annotated[int, "image height, px"] = 1200
-    coefficients: Annotated[tuple[float, ...], "k1 to k4 of kannala_brandt; empty for the other lenses"] = ()
+    coefficients: Annotated[tuple[float, ...], f"{coefficients_text()}; empty for the other lenses"] = ()
     nominal_f: Annotated[float | None, "nominal focal length, px; the mean of fx and fy if left out"] = None
     max_field_deg: Annotated[
         float | None, "largest angle, degrees, of the board's centre from the optical axis; no limit if left out"

@@ -20,6 +20,7 @@ from datasets.recipe.cameras import assumed_camera as assumed_camera
 from datasets.recipe.describe import Key, keys_of, sentence, values_of
 from datasets.recipe.outputs import Outputs
 from datasets.recipe.quality import QUALITIES, QualityName, quality_text
+from datasets.recipe.sensor import sensor_values
 from datasets.recipe.targets import DEFAULT_PATTERN, target_values
 from datasets.recipe.world_file import with_world_file
 from datasets.recipe.written_out import written_out
@@ -138,10 +139,11 @@ class Recipe(BaseModel):
     def digest(self) -> str:
         """Hash of everything that decides the content; name and description do not, nor how samples are chosen.
 
-        Sections that a recipe leaves out take no part, so that new sections do not change the hashes of old recipes. Of
-        a world's file its hash counts, not its place.
+        Sections that a recipe leaves out take no part, nor do later keys of its sensor, so that these do not change the
+        hashes of old recipes. Of a world's file its hash counts, not its place.
         """
         content = self.model_dump(mode="json", exclude={"name", "description", "quality"})
+        content["sensor"] = sensor_values(self.sensor)
         content |= {"samples": self.sample_count(), "target": target_values(self.target)}
         for name, default in (("world", World()), ("outputs", Outputs())):
             if getattr(self, name) == default:

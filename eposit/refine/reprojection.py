@@ -170,7 +170,7 @@ def _radial(camera: Camera, point: Array, slopes: bool) -> tuple[Array, Array, A
     if np.isinf(law.rho_max):  # a pole at theta_max: nothing lies beyond it
         theta = np.where(theta < law.theta_max, theta, np.nan)
     on_axis = side == 0.0
-    scale = np.where(on_axis, 1.0 / z, law.raw_rho(theta) / np.where(on_axis, 1.0, side))
+    scale = np.where(on_axis, law.raw_slope(np.zeros(())) / z, law.raw_rho(theta) / np.where(on_axis, 1.0, side))
     scale = np.where(np.isnan(scale), np.inf, scale)
     if not slopes:
         return scale, scale, None

@@ -23,6 +23,7 @@ from datasets.store.linear_images import LinearImageError, are_kept, linear_key,
 from datasets.store.pixel_truth import truth_path, write_truth
 from datasets.store.refusals import refused
 from eposit.arrays import Array, Mask
+from eposit.calibrated_lens import MOST_COEFFICIENTS
 from eposit.pose import tilt_rad
 from pipelines.engines.background import overlapped
 from render.frame import LinearImage, render_world, truth_of
@@ -166,7 +167,7 @@ def _finish(
 def _row(recipe: Recipe, frame: Frame, region: Region, image: NDArray[np.uint8]) -> dict[str, object]:
     """The frame's row of `frames`."""
     spec = frame.camera
-    coefficients = np.zeros(4)
+    coefficients = np.zeros(MOST_COEFFICIENTS)
     coefficients[: len(spec.coefficients)] = spec.coefficients
     has_world = recipe.world.method != "closed"
     drawn = {f"{WORLD_PREFIX}{name}": value if has_world else None for name, value in asdict(frame.world).items()}

@@ -43,7 +43,7 @@ class DeviceCamera:
         theta = incidence_angle(self.law, dr.minimum(rho, self.law.rho_max))
         off_axis = rho > 0.0
         inverse = dr.select(off_axis, 1.0 / rho, 0.0)
-        side = dr.select(off_axis, theta.sine * inverse, 1.0)
+        side = dr.select(off_axis, theta.sine * inverse, theta.slope)
         ex, ey = x * inverse, y * inverse
         radial = dr.select(off_axis, theta.cosine * theta.slope - side, 0.0)  # beyond what it changes across
         axial = -theta.sine * theta.slope

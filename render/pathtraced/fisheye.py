@@ -13,6 +13,7 @@ import numpy as np
 
 from eposit import Camera, Pose
 from eposit.arrays import Array
+from eposit.calibrated_lens import MOST_COEFFICIENTS
 from render import backend
 from render.device import (
     DeviceBool,
@@ -98,7 +99,7 @@ def _direction(law: DeviceLens, image: DevicePoint2) -> tuple[DeviceVector3, Dev
     mi, dr = backend.load(), backend.jit()
     rho = dr.norm(image)
     theta = incidence_angle(law, dr.minimum(rho, law.rho_max))
-    side = dr.select(rho > 0.0, theta.sine / rho, 1.0)
+    side = dr.select(rho > 0.0, theta.sine / rho, 1.0)  # on the axis both coordinates are 0
     return mi.Vector3f(image.x * side, image.y * side, theta.cosine), rho <= law.rho_max
 
 
@@ -116,7 +117,7 @@ def register_sensor() -> None:
     class Fisheye(mi.Sensor):
         def __init__(self, props: Any) -> None:  # Any: values of the dictionary above
             super().__init__(props)
-            coefficients = tuple(props[f"k{i}"] for i in range(1, 5) if f"k{i}" in props)
+            coefficients = tuple(props[f"k{i}"] for i in range(1, 1 + MOST_COEFFICIENTS) if f"k{i}" in props)
             to_world = np.array(props["to_world"].matrix, dtype=np.float64)
             self.law = device_lens(props["lens"], coefficients)
             focal, centre = ((props[x], props[y]) for x, y in (("fx", "fy"), ("cx", "cy")))

@@ -17,7 +17,7 @@ from render.region import Image
 from render.sensor.motion import Exposure, PoseRate
 from render.sensor.motion_blur import motion_blurred
 from render.sensor.noise import electron_noise
-from render.sensor.optics import disc_kernel, normalised_axes, vignetting_gain
+from render.sensor.optics import disc_kernel, natural_falloff, normalised_axes, vignetting_gain
 from render.sensor.presets import SensorModel
 from render.targets import Target
 from render.targets.image_region import Region
@@ -43,14 +43,16 @@ def develop(radiance: Image, model: SensorModel, frame: FrameContext | None = No
 
     Colours fall and spread alike, and each has noise of its own.
 
-    frame: for models with noise, motion or uneven light.
+    frame: for models with noise, motion, uneven light or the lens's natural fall-off.
 
     Raises:
         ValueError: such a model without a frame.
     """
     bits = None if frame is None else np.random.SFC64(frame.seed)
     if bits is None and model.needs_frame:
-        raise ValueError("the sensor model has noise, motion or uneven light; give the frame as `frame`")
+        raise ValueError(
+            "the sensor model has noise, motion, uneven light or natural fall-off; give the frame as `frame`"
+        )
     direction = 0.0 if bits is None else 2.0 * np.pi * int(bits.random_raw()) / 2.0**64
     planes = [radiance] if radiance.ndim == 2 else [np.ascontiguousarray(radiance[..., i]) for i in range(3)]
     falling = [_on_the_sensor(plane, model, frame, direction) for plane in planes]
@@ -63,7 +65,7 @@ def develop(radiance: Image, model: SensorModel, frame: FrameContext | None = No
 
 def _on_the_sensor(radiance: Image, model: SensorModel, frame: FrameContext | None, direction: float) -> Image:
     """Light as the lens and the motion leave it. direction: in which it falls unevenly, rad."""
-    light = _point_spread(_uneven_light(radiance, model, direction), model)
+    light = _point_spread(_through_the_pupil(_uneven_light(radiance, model, direction), model, frame), model)
     if frame is None or model.exposure_s == 0.0:
         return light
     exposure = Exposure(frame.target, frame.camera, frame.cam_from_obj, frame.rate, model.exposure_s)
@@ -86,6 +88,13 @@ def _uneven_light(radiance: Image, model: SensorModel, direction: float) -> Imag
         gain *= vignetting_gain(*size, model.vignetting)
     gain *= radiance
     return gain
+
+
+def _through_the_pupil(light: Image, model: SensorModel, frame: FrameContext | None) -> Image:
+    """Light after the lens's natural fall-off."""
+    if frame is None or model.natural_falloff == 0.0:
+        return light
+    return light * natural_falloff(frame.camera, model.natural_falloff)
 
 
 def _point_spread(light: Image, model: SensorModel) -> Image:

@@ -1,4 +1,4 @@
-"""What a lens does to light besides its projection: the disc of defocus and the loss towards the corners."""
+"""What a lens does to light besides its projection: the disc of defocus and the loss towards corners and rim."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import functools
 import numpy as np
 from numpy.typing import NDArray
 
+from eposit import Camera
 from eposit.arrays import Array
 
 
@@ -48,6 +49,28 @@ def vignetting_gain(width: int, height: int, loss: float) -> NDArray[np.float32]
     k = 1.0 / np.sqrt(1.0 - loss) - 1.0
     x, y = normalised_axes(width, height)
     return (1.0 / (1.0 + k * (x[None] ** 2 + y[:, None] ** 2)) ** 2).astype(np.float32)
+
+
+@functools.lru_cache(maxsize=8)
+def natural_falloff(camera: Camera, power: float) -> NDArray[np.float32]:
+    """(height, width) share of light that a flat pupil of fixed size lets through to each pixel, 1 on the optical axis.
+
+    A pixel sees the solid angle sin t dt dphi through a pupil that has cos t of its area, and has the area
+    rho drho dphi, so that the share is cos t sin t / (rho rho') = d(sin^2 t) / d(rho^2): here the ratio of the
+    differences over the pixel's width, which is finite where rho' vanishes at the rim. It is cos^4 t for a perspective
+    lens, cos t cos^4(t/2) stereographic, cos t sin t / t equidistance, cos t equisolid and 1 orthogonal; past 90
+    degrees the pupil shows its back, and nothing arrives.
+
+    power: the share is raised to it.
+    """
+    law = camera.law
+    x, y = (np.arange(camera.width) - camera.cx) / camera.fx, (np.arange(camera.height) - camera.cy) / camera.fy
+    radius, half = np.hypot(x[None], y[:, None]), 0.5 / np.sqrt(camera.fx * camera.fy)
+    inner, outer = np.clip((radius - half, radius + half), 0.0, law.rho_max)
+    sine_squared = np.sin(law.theta(outer)) ** 2 - np.sin(law.theta(inner)) ** 2
+    area = outer**2 - inner**2
+    share = np.divide(sine_squared, area, out=np.zeros_like(area), where=area > 0.0) * law.slope(0.0) ** 2
+    return (np.maximum(share, 0.0) ** power).astype(np.float32)
 
 
 def normalised_axes(width: int, height: int) -> tuple[Array, Array]:

@@ -23,6 +23,11 @@ class SensorModel:
     defocus_radius_px: Annotated[float, "radius of the disc that a point out of focus becomes, px; 0 for none"] = 0.0
     exposure_s: Annotated[float, "exposure time, s, during which the board moves at its pose's rate; 0 for none"] = 0.0
     vignetting: Annotated[float, "share of light lost in the picture's corners, by the cos^4 law; 0 for none"] = 0.0
+    natural_falloff: Annotated[
+        float,
+        "power of what the lens loses towards its rim by a flat pupil of fixed size: 1 for all (cos^4 of a perspective "
+        "lens, none of an orthogonal one), less where the pupil grows with the angle, 0 for none",
+    ] = 0.0
     uneven: Annotated[
         float, "gradient of light over the picture, share of the mean at the corners, direction by frame; 0 for none"
     ] = 0.0
@@ -38,6 +43,7 @@ class SensorModel:
             "defocus_radius_px": (0.0, 20.0, " px"),
             "exposure_s": (0.0, 1.0, " s"),
             "vignetting": (0.0, 0.95, ""),
+            "natural_falloff": (0.0, 2.0, ""),
             "uneven": (0.0, 0.95, ""),
             "full_well_e": (0.0, 1e7, " electrons"),
             "read_noise_e": (0.0, 1e5, " electrons"),
@@ -55,8 +61,8 @@ class SensorModel:
 
     @property
     def needs_frame(self) -> bool:
-        """Whether a picture depends on the frame's seed or motion and not on its light alone."""
-        return self.full_well_e > 0.0 or self.uneven > 0.0 or self.exposure_s > 0.0
+        """Whether a picture depends on the frame's seed, motion or camera and not on its light alone."""
+        return any(value > 0.0 for value in (self.full_well_e, self.uneven, self.exposure_s, self.natural_falloff))
 
 
 def regimes() -> dict[str, SensorModel]:

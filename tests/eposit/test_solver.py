@@ -30,7 +30,8 @@ def problems(camera, seed, count, limit_deg, ratio, poses_each=10):
 
 @pytest.mark.parametrize("camera", ALL_CAMERAS, ids=lambda camera: camera.lens)
 def test_default_solver_is_exact(camera):
-    limit = 100.0 if camera.lens in PAST_90 else 85.0
+    # At 85 degrees the polynomial of the distorted pinhole is at 5e8 px, where doubles are good to 1e-7 px.
+    limit = 100.0 if camera.lens in PAST_90 else 70.0 if camera.lens == "pinhole_radial" else 85.0
     for points, pose, pixels in problems(camera, 11, PROBLEMS, limit, (0.02, 0.3)):
         solution = eposit.solve(points, pixels, camera)
         assert set(solution.status) == {"ok"}
@@ -237,9 +238,10 @@ def test_a_wrong_call_is_a_sentence(points, pixels, options):
         eposit.solve(points, pixels, paper_camera("equidistance"), **options)
 
 
-def test_lens_names_are_the_papers_five_and_kannala_brandt():
+def test_lens_names_are_the_papers_five_and_those_of_calibrations():
     assert LENS_NAMES == (
         "perspective", "stereographic", "equidistance", "equisolid", "orthogonal", "kannala_brandt",
+        "pinhole_radial", "eucm", "double_sphere",
     )  # fmt: skip
 
 

@@ -6,12 +6,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pipelines.detection.board_map import BoardMap, grid, normal_angles
-from tests.cameras import RADIUS
+from tests.cameras import COEFFICIENTS, RADIUS
 
 INNER, SIZE = (9, 6), (1600, 1200)
 CORNERS = grid(INNER)
 CENTRE = (782.41, 613.71)
-LENSES = [lens for lens in RADIUS if lens != "kannala_brandt"]  # the paper's five
+LENSES = [lens for lens in RADIUS if lens not in COEFFICIENTS]  # the paper's five
 # Angles of rotation, degrees; place of the board's middle, squares. The largest angle of a corner is 18, 21, 22, 39,
 # 63 and 61 degrees: a pinhole picture holds the first three only.
 POSES = {

@@ -7,6 +7,7 @@ from eposit import LENS_NAMES, Camera, Pose
 from eposit.pose import rotation_from_vector
 from pipelines.photometric.image_flow import image_flow, plane_points, projection_slopes
 from render.targets.image_region import Region
+from tests.cameras import COEFFICIENTS
 from tests.pipelines.photometric.small import FISHEYE, small
 
 POINTS = np.array([[0.3, -0.2, 1.0], [-0.9, 0.4, 0.8], [0.0, 0.0, 2.0], [0.1, 0.5, 0.6]]) * 1000.0
@@ -15,8 +16,7 @@ STEP = 1e-3  # mm, of points a metre away: truncation and rounding are both some
 
 @pytest.mark.parametrize("lens", LENS_NAMES)
 def test_slopes_of_the_projection(lens):
-    coefficients = (-0.04, 0.003, -0.0004, 0.00002) if lens == "kannala_brandt" else ()
-    camera = FISHEYE.replace(lens=lens, coefficients=coefficients)
+    camera = FISHEYE.replace(lens=lens, coefficients=COEFFICIENTS.get(lens, ()))
     found = projection_slopes(camera, POINTS.T)
     for axis, step in enumerate(STEP * np.eye(3)):
         numeric = (camera.project(POINTS + step) - camera.project(POINTS - step)) / (2.0 * STEP)

@@ -12,18 +12,20 @@ from pipelines.stages.generate import outline_centroid
 from render import backend
 from render.pathtraced.fisheye import sensor_dict
 from render.targets.image_region import Region
-from tests.cameras import KB, RADIUS
+from tests.cameras import COEFFICIENTS, RADIUS
 
 WIDTH, HEIGHT, SAMPLES = 800, 600, 256
 DIRECTIONS, DOT_PX, DISTANCE_MM = 12, 4.0, 1000.0
 CENTRE = (403.3, 296.8)
+RINGS_DEG = {"perspective": (30.0, 70.0), "pinhole_radial": (12.0, 45.0)}
+FISHEYE_RINGS_DEG = (12.0, 80.0)
 MEAN_PX, DOT_RMS_PX = 0.005, 0.02
 
 
 def camera_for(lens):
     """The focal length that puts the outermost ring, and its dots, just inside the picture."""
-    f = 280.0 / RADIUS[lens](np.deg2rad(70.0 if lens == "perspective" else 80.0))
-    coefficients = KB if lens == "kannala_brandt" else ()
+    f = 280.0 / RADIUS[lens](np.deg2rad(RINGS_DEG.get(lens, FISHEYE_RINGS_DEG)[1]))
+    coefficients = COEFFICIENTS.get(lens, ())
     return Camera(
         lens=lens, fx=f, fy=1.001 * f, cx=CENTRE[0], cy=CENTRE[1], width=WIDTH, height=HEIGHT, coefficients=coefficients
     )
@@ -45,7 +47,7 @@ def project(camera, points, scale=1.0, shift=0.0):
 def dots(camera):
     """Rings x directions of discs that face the camera: centre, two axes as long as the radius."""
     # The inner ring is wide enough that its dots do not touch.
-    rings = np.deg2rad(np.linspace(*((30.0, 70.0) if camera.lens == "perspective" else (12.0, 80.0)), 6))
+    rings = np.deg2rad(np.linspace(*RINGS_DEG.get(camera.lens, FISHEYE_RINGS_DEG), 6))
     found = []
     for i, theta in enumerate(rings):
         step = 1e-5

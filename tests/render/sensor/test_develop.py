@@ -7,18 +7,20 @@ import numpy as np
 import pytest
 from scipy.stats import kstest, norm
 
-from eposit import Camera, Pose
+from eposit import LENS_NAMES, Camera, Pose
 from eposit.pose import rotation_from_euler
+from render.analytic.image_circle import lens_coverage
 from render.frame import render_frame
 from render.light import Light
 from render.sensor.develop import FrameContext, develop
 from render.sensor.motion import Exposure, PoseRate, at_pixels
 from render.sensor.motion_blur import MIN_MOTION_PX, SHORT_MOTION_PX
 from render.sensor.noise import standard_normals
-from render.sensor.optics import disc_kernel, vignetting_gain
+from render.sensor.optics import disc_kernel, natural_falloff, vignetting_gain
 from render.sensor.presets import SensorModel, regime_of, regimes
 from render.targets.chessboard import Chessboard
 from render.targets.image_region import Region
+from tests.cameras import COEFFICIENTS, RADIUS
 
 TARGET = Chessboard()
 CAMERA = Camera(lens="perspective", fx=400.0, fy=400.0, cx=199.5, cy=149.5, width=400, height=300)
@@ -74,6 +76,68 @@ def test_corners_lose_light_by_the_cos4_law():
         assert gain[y, x] == pytest.approx(np.cos(np.arctan(slope * radius)) ** 4, abs=1e-6)
     grey = develop(flat(0.5), dataclasses.replace(BARE, vignetting=0.4))
     np.testing.assert_array_equal(grey, np.rint(127.5 * gain).astype(np.uint8))
+
+
+FALL_OFF = {  # of a flat pupil of fixed size, over the incidence angle, rad
+    "perspective": lambda a: np.cos(a) ** 4,
+    "stereographic": lambda a: np.cos(a) * np.cos(a / 2) ** 4,
+    "equidistance": lambda a: np.cos(a) * np.sin(a) / a,
+    "equisolid": np.cos,
+    "orthogonal": np.ones_like,
+}
+
+
+def lens_camera(lens):
+    """A camera whose corner lies at 75 degrees, of a distorted pinhole at 45; that of an orthogonal lens is dark."""
+    corner = np.deg2rad(45.0 if lens == "pinhole_radial" else 75.0)
+    f = 249.0 / (0.95 if lens == "orthogonal" else RADIUS[lens](corner))
+    k = COEFFICIENTS.get(lens, ())
+    return CAMERA.replace(lens=lens, fx=f, fy=1.02 * f, cx=195.3, cy=152.1, coefficients=k)
+
+
+@pytest.mark.parametrize("lens", FALL_OFF)
+def test_the_pupils_fall_off_is_the_lenss_formula(lens):
+    camera = lens_camera(lens)
+    x, y = np.meshgrid(np.arange(400.0), np.arange(300.0))
+    theta = camera.law.theta(np.hypot((x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy))
+    seen = np.isfinite(theta)
+    # The gain is the mean over the pixel's width: its second derivative, at most 20 / f^2, over 24.
+    np.testing.assert_allclose(natural_falloff(camera, 1.0)[seen], FALL_OFF[lens](theta[seen]), rtol=0, atol=2e-4)
+    assert natural_falloff(camera, 0.5) == pytest.approx(np.sqrt(natural_falloff(camera, 1.0)), abs=1e-6)
+
+
+@pytest.mark.parametrize("lens", LENS_NAMES)
+def test_the_pupils_fall_off_is_the_solid_angle_of_a_pixel_times_its_cosine(lens):
+    camera, n = lens_camera(lens), 40
+    sub = (np.arange(n) + 0.5) / n - 0.5
+    middle = None
+    for pixel in ((195, 152), (60, 152), (195, 20), (330, 250), (120, 90)):
+        x, y = np.meshgrid(pixel[0] + sub, pixel[1] + sub)
+        ray, right, down = (
+            camera.bearing(np.stack((x + dx, y + dy), axis=-1)) for dx, dy in ((0, 0), (1e-3, 0), (0, 1e-3))
+        )
+        solid_angle = np.linalg.norm(np.cross(right - ray, down - ray), axis=-1) * 1e6
+        light = np.mean(solid_angle * ray[..., 2])
+        middle = light if middle is None else middle
+        # The forward difference of 1e-3 px is as wrong as 1e-3 / f; the first pixel lies 0.3 px off the axis.
+        assert natural_falloff(camera, 1.0)[pixel[1], pixel[0]] == pytest.approx(light / middle, abs=2e-4)
+
+
+def test_a_flat_pupil_lets_nothing_through_past_90_degrees_and_blurs_no_picture():
+    wide = CAMERA.replace(lens="equidistance", fx=120.0, fy=120.0)
+    gain = natural_falloff(wide, 1.0)
+    assert gain[149, 10] == 0.0  # 1.57 rad are 188.5 px
+    assert gain[149, 12] > 0.0
+    grey = develop(flat(0.5), dataclasses.replace(BARE, natural_falloff=1.0), shot(camera=wide))
+    np.testing.assert_array_equal(grey, np.rint(np.float32(127.5) * gain).astype(np.uint8))
+
+
+def test_fall_off_is_finite_where_the_polynomial_turns():
+    camera = CAMERA.replace(lens="kannala_brandt", fx=250.0, fy=250.0, coefficients=(-0.25, 0.0, 0.0, 0.0))
+    gain = natural_falloff(camera, 1.0)
+    assert np.all(np.isfinite(gain))
+    light = gain * lens_coverage(camera)
+    assert 1.0 < light.max() < 20.0  # a ring of rays falls on a pixel at the turn; a slice of one at the rim gets more
 
 
 def test_uneven_light_is_a_plane_in_a_direction_of_the_frame():
@@ -219,7 +283,7 @@ def test_the_blur_is_the_mean_of_renders_on_the_way():
 
 
 def test_frames_are_asked_for_where_they_matter():
-    for change in ({"full_well_e": 100.0}, {"uneven": 0.1}, {"exposure_s": 0.1}):
+    for change in ({"full_well_e": 100.0}, {"uneven": 0.1}, {"exposure_s": 0.1}, {"natural_falloff": 1.0}):
         with pytest.raises(ValueError, match="give the frame"):
             develop(flat(0.5), dataclasses.replace(BARE, **change))
 
