@@ -46,7 +46,7 @@ RECIPES = {
     "unknown lens": (recipe('lens = "perspective"', 'lens = "fisheye"'), "unknown lens 'fisheye'; known lenses are"),
     "kannala-brandt with three": (
         recipe('lens = "perspective"', 'lens = "kannala_brandt"\ncoefficients = [0.1, 0.0, 0.0]'),
-        "takes four finite coefficients",
+        "takes 4 finite coefficients",
     ),
     "coefficients for a pinhole": (added("coefficients = [0.1]"), "takes no coefficients"),
     "samples not a square": (recipe("samples = 4", "samples = 5"), "must be a square number"),

@@ -101,6 +101,7 @@ def test_the_same_code_is_fine_in_every_gate(night, nights):
     assert json.loads((nights / "metrics.json").read_text())["exit"] == 0
 
 
+@pytest.mark.full
 def test_corners_that_are_off_by_two_thousandths_of_a_pixel_are_worse(night, monkeypatch, nights, cli):
     """Exit code 1, on pinned pictures and on two looks at fresh ones; `explain` names frames."""
     _plant(monkeypatch, 0.002)

@@ -14,6 +14,7 @@ def frozen(tmp_path_factory):
     return freeze(tmp_path_factory.mktemp("code"))
 
 
+@pytest.mark.full
 def test_frozen_code_makes_the_same_scores(frozen, tiny, tmp_path, content):
     folder = tmp_path / "dataset"
     shutil.copytree(tiny[1], folder)
@@ -46,6 +47,7 @@ def test_a_folder_without_a_package_does_not_run_the_checkouts(frozen, tmp_path)
         Code(partial).run("recipes")
 
 
+@pytest.mark.full
 def test_the_library_alone_can_be_another(frozen, tmp_path):
     library = tmp_path / "library"
     shutil.copytree(frozen / "eposit", library / "eposit")

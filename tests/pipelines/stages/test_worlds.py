@@ -85,6 +85,7 @@ def test_two_workers_resumed_or_without_masters_give_the_same_content(made, tmp_
     assert [data for _, data in one] == [data for _, data in other]
 
 
+@pytest.mark.full
 def test_linear_light_is_developed_again_without_rays(made, tmp_path, cli, monkeypatch):
     recipe, root = made
 
@@ -135,6 +136,7 @@ def test_what_is_linear_in_colour_and_true_for_each_pixel(made):
     assert 0 < sum(keypoints["visible"].to_pylist()) < len(keypoints)  # something stands before some
 
 
+@pytest.mark.full
 def test_detection_reads_the_grey_of_colour(made, tmp_path, cli):
     root = tmp_path / "dataset"
     shutil.copytree(made[1], root)
