@@ -15,7 +15,6 @@ from render.targets.chessboard import Chessboard
 from render.targets.image_region import Region
 from render.world import World, draw_world
 
-
 TARGET, LIGHT = Chessboard(columns=5, rows=4), Light()  # small: its bake is quick
 CAMERA = Camera(lens="equisolid", fx=70.0, fy=70.2, cx=80.3, cy=58.9, width=160, height=120)
 CELLS, SEED = 64, 11
