@@ -27,10 +27,12 @@ class Camera:
     cy: float  # principal point, px
     width: int  # image width, px
     height: int  # image height, px
-    coefficients: tuple[float, ...] = ()  # k1..k4 of Kannala-Brandt, empty for the other lenses
+    coefficients: tuple[
+        float, ...
+    ] = ()  # k1..k4 of Kannala-Brandt, in any shape, (4, 1) too; empty for the other lenses
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "coefficients", tuple(float(k) for k in self.coefficients))
+        object.__setattr__(self, "coefficients", tuple(float(k) for k in np.ravel(self.coefficients)))
         for name in ("fx", "fy", "width", "height"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0):
