@@ -54,14 +54,14 @@ class Slice:
     def has(self, metrics: Sequence[str]) -> Mask:
         """(m, f) whether a frame has a metric."""
         nothing = np.full(len(self.frame_id), np.nan)
-        return np.isfinite([self.values.get(name, nothing) for name in metrics]).reshape(len(metrics), -1)
+        return np.isfinite([self.values.get(name, nothing) for name in metrics]).reshape(len(metrics), len(nothing))
 
     def by_pose(self, metrics: Sequence[str], poses: NDArray[np.int64]) -> Array:
         """(m, p) means of metrics over the frames of each of `poses`, which are sorted; NaN where none has it."""
-        values = np.array([self.values[name] for name in metrics]).reshape(len(metrics), -1)
+        values = np.array([self.values[name] for name in metrics]).reshape(len(metrics), len(self.pose_id))
         if np.array_equal(self.pose_id, poses):  # one frame for each, as wherever a camera is in a pose once
             return np.where(np.isfinite(values), values, np.nan)
-        return np.array([self._means(row, poses) for row in values]).reshape(len(metrics), -1)
+        return np.array([self._means(row, poses) for row in values]).reshape(len(metrics), len(poses))
 
     def _means(self, values: Array, poses: NDArray[np.int64]) -> Array:
         own = np.isfinite(values) & np.isin(self.pose_id, poses)

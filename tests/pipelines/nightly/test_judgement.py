@@ -6,6 +6,7 @@ import pytest
 
 from pipelines.nightly.comparison import Verdict
 from pipelines.nightly.judgement import judge
+from pipelines.nightly.metrics import METRICS
 from tests.pipelines.nightly import simulated
 
 ALPHA = 0.01
@@ -90,3 +91,16 @@ def test_a_number_that_is_gone_is_a_failure_and_not_left_out(metric):
         assert {frame for item in found.failures for frame in item.new} == frames
         assert len(found.lost) == lost
         assert judge(cut, night, ALPHA, paired=True).new_failures == 0
+
+
+@pytest.mark.parametrize("paired", [True, False])
+def test_a_system_that_fails_in_every_frame_is_judged(paired):
+    """It has no metric left to compare; its failures are told all the same."""
+    night = simulated.night(10, np.random.default_rng(5))
+    broken = pa.table({name: pa.nulls(len(night), night.schema.field(name).type) if name in METRICS else night[name]
+                       for name in night.schema.names})  # fmt: skip
+    broken = broken.set_column(broken.schema.get_field_index("failed"), "failed", pa.array([True] * len(night)))
+    found = judge(night, broken, ALPHA, paired=paired)
+    assert not found.findings
+    assert found.new_failures == (len(night) if paired else 0)
+    assert found.lost

@@ -167,13 +167,8 @@ def test_a_failure_of_a_users_system_can_be_waived(night, own):
     assert (row["exit"], _state(row, "failures")[0]) == (0, "waived")
 
 
-# Open: with every row failed a later gate cannot run, and the night ends with 4 instead of 1.
-OPEN = ("raises", "exits")
-
-
-@pytest.mark.parametrize(
-    "fault", [pytest.param(name, marks=pytest.mark.slow if name in OPEN else pytest.mark.full) for name in FAULTS]
-)
+@pytest.mark.full
+@pytest.mark.parametrize("fault", FAULTS)
 def test_a_function_that_breaks(night, own, fault):
     """One that raises or exits has failures, code 1; one that ends its process, hangs or is not understood, code 4."""
     (own / "mine.py").write_text(MINE.replace("camera):\n", f"camera):\n{FAULTS[fault]}\n", 1))
