@@ -48,7 +48,7 @@ def place_points(image: Grey, seen: SeenPoints, target: PrintedBoard) -> Corners
     Raises:
         LinAlgError: points that no camera could see.
     """
-    unit = unit_mm(target)
+    unit = target.unit_mm
     at, size = target.pattern_points / unit, (image.shape[1], image.shape[0])
     board = _first_map(seen, at, size, _lift(target, unit))
     if isinstance(target, CircleGrid):
@@ -68,7 +68,7 @@ def place_points(image: Grey, seen: SeenPoints, target: PrintedBoard) -> Corners
 def check_seen(image: Grey, seen: SeenPoints, placed: Corners, target: PrintedBoard) -> Corners:
     """The points as OpenCV places them, those of corners after `cv2.cornerSubPix`; checked as our own are."""
     points = seen.points_px if isinstance(target, CircleGrid) else subpix(image, seen.points_px)
-    at, size = target.pattern_points[seen.ids] / unit_mm(target), (image.shape[1], image.shape[0])
+    at, size = target.pattern_points[seen.ids] / target.unit_mm, (image.shape[1], image.shape[0])
     chosen = np.zeros(len(placed.points_px), bool)
     chosen[seen.ids] = True
     order = np.argsort(seen.ids)
@@ -76,19 +76,9 @@ def check_seen(image: Grey, seen: SeenPoints, placed: Corners, target: PrintedBo
     return _spread(checked, chosen)
 
 
-def unit_mm(target: PrintedBoard) -> float:
-    """The length that detection counts in: a square, a tag or a spacing."""
-    if isinstance(target, AprilGrid):
-        return target.tag_mm
-    if isinstance(target, CircleGrid):
-        return target.spacing_mm
-    assert isinstance(target, Charuco | PlainChessboard)
-    return target.square_mm
-
-
 def corner_sites(target: PrintedBoard) -> CornerSites:
     """Where the target's points are corners, and what lies around them."""
-    unit, lattice = unit_mm(target), target.lattice()
+    unit, lattice = target.unit_mm, target.lattice()
     points = target.pattern_points
     before = points - 0.25 * lattice.least_gap_mm
     columns, rows = (

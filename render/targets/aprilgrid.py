@@ -53,6 +53,11 @@ class AprilGrid(PrintedBoard):
         return (1.0 + self.spacing) * self.tag_mm
 
     @property
+    def unit_mm(self) -> float:
+        """Side of a tag, mm."""
+        return self.tag_mm
+
+    @property
     def point_grid(self) -> tuple[int, int]:
         """Columns and rows of the tags' corners."""
         return 2 * self.columns, 2 * self.rows

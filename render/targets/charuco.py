@@ -5,17 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from eposit.arrays import Array
 from render.targets import PATTERN_MEANING
 from render.targets.lattice import Lattice, Rectangle, bit_rectangles, lattice_of
 from render.targets.markers import DICTIONARIES, marker_bits, marker_count
-from render.targets.printed import MAX_LINES, PrintedBoard, check_counts, check_length, grid_points
-
-LEAST_SQUARES, MOST_SQUARES = 3, 60
+from render.targets.printed import MAX_LINES
+from render.targets.squares import BoardOfSquares
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Charuco(PrintedBoard):
+class Charuco(BoardOfSquares):
     """What `cv2.aruco.CharucoBoard` draws for these numbers; the origin is the first inner corner.
 
     Points: inner corners row by row, numbered as OpenCV numbers them. The first square, at negative x and y, is black;
@@ -26,16 +24,12 @@ class Charuco(PrintedBoard):
     """
 
     pattern: Annotated[Literal["charuco"], PATTERN_MEANING] = "charuco"
-    columns: Annotated[int, "squares along x"] = 10
-    rows: Annotated[int, "squares along y"] = 7
-    square_mm: Annotated[float, "side of a square, mm"] = 100.0
     marker_mm: Annotated[float, "side of a marker with its black border, mm"] = 75.0
     dictionary: Annotated[str, "OpenCV's dictionary of the markers without its prefix DICT_, such as 4X4_50"] = "4X4_50"
 
     def check_pattern(self) -> None:
         """Refuse a pattern that cannot be."""
-        check_counts("squares", self.columns, self.rows, LEAST_SQUARES, MOST_SQUARES)
-        check_length("square_mm", self.square_mm)
+        BoardOfSquares.check_pattern(self)  # a slotted dataclass is made anew, so that a bare super() fails
         if not 0.3 * self.square_mm <= self.marker_mm <= 0.9 * self.square_mm:
             raise ValueError(
                 f"target marker_mm is {self.marker_mm}; it must lie in 0.3 to 0.9 of a square, "
@@ -56,30 +50,9 @@ class Charuco(PrintedBoard):
             )
 
     @property
-    def inner(self) -> tuple[int, int]:
-        """Inner corners along x and along y."""
-        return self.columns - 1, self.rows - 1
-
-    @property
     def marker_count(self) -> int:
         """White squares."""
         return self.columns * self.rows // 2
-
-    @property
-    def point_grid(self) -> tuple[int, int]:
-        """Columns and rows of the inner corners."""
-        return self.inner
-
-    @property
-    def pattern_points(self) -> Array:
-        """(n, 2) inner corners, mm, x fastest."""
-        return grid_points(*self.inner, self.square_mm)
-
-    @property
-    def pattern_extent_mm(self) -> tuple[float, float, float, float]:
-        """Of the squares, mm."""
-        square = self.square_mm
-        return -square, (self.columns - 1) * square, -square, (self.rows - 1) * square
 
     def draw(self) -> Lattice:
         """Squares and the modules of the markers."""

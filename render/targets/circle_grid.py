@@ -53,6 +53,11 @@ class CircleGrid(PrintedBoard):
         return self.asymmetric and self.rows % 2 == 1
 
     @property
+    def unit_mm(self) -> float:
+        """Spacing of the discs, mm."""
+        return self.spacing_mm
+
+    @property
     def point_grid(self) -> tuple[int, int]:
         """Discs in a row, and rows."""
         return self.columns, self.rows

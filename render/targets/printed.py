@@ -64,6 +64,11 @@ class PrintedBoard(ABC):
 
     @property
     @abstractmethod
+    def unit_mm(self) -> float:
+        """The length that detection counts in, mm: the side of a square or tag, or the spacing of discs."""
+
+    @property
+    @abstractmethod
     def pattern_points(self) -> Array:
         """(n, 2) nominal places of the points on the print, mm; a point's number is its id."""
 

@@ -64,3 +64,24 @@ class Page(HTMLParser):
     def handle_data(self, data):
         for item in self._open:
             item.words.append(data)
+
+
+def assert_named_for_a_screen_reader(page):
+    """Every section, figure, table and control has a name; what others refer to exists once."""
+    ids = [item.attributes["id"] for item in page.all if "id" in item.attributes]
+    assert len(ids) == len(set(ids))
+    for item in page.all:
+        for name in ("aria-labelledby", "aria-describedby"):
+            assert item.attributes.get(name, ids[0]) in ids
+        href = item.attributes.get("href", "#")
+        assert href == "#" or href.startswith("data:") or href[1:] in ids
+    assert all("aria-labelledby" in item.attributes for item in page.of("section"))
+    assert [len(page.of(tag)) for tag in ("header", "main", "footer", "h1")] == [1, 1, 1, 1]
+    for item in page.of("svg"):
+        hidden = item.attributes.get("aria-hidden") == "true"
+        assert hidden != (item.attributes.get("role") == "img" and bool(item.attributes.get("aria-label")))
+    captioned = [item.parents[-1] for item in page.of("caption")]
+    assert all(any(table is other for other in captioned) for table in page.of("table"))
+    assert all("scope" in item.attributes for item in page.of("th"))
+    for item in page.of("input") + page.of("select"):
+        assert any(parent.tag == "label" for parent in item.parents)

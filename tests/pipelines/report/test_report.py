@@ -9,7 +9,7 @@ from datasets.store.images import decode_png
 from pipelines.report.data import ERRORS, Series, cells, normalised_rows, series
 from pipelines.report.page import REPORT, write_report
 from pipelines.report.points import field_rows, point_errors, tilt_rows
-from tests.pipelines.pages.parsed import Page
+from tests.pipelines.pages.parsed import Page, assert_named_for_a_screen_reader
 
 
 def test_report_is_one_file_without_the_network(tiny):
@@ -31,19 +31,7 @@ def test_report_is_one_file_without_the_network(tiny):
 
 def test_everything_has_a_name_for_a_screen_reader(tiny):
     _, root = tiny
-    page = Page((root / REPORT).read_text())
-    ids = [item.attributes["id"] for item in page.all if "id" in item.attributes]
-    assert len(ids) == len(set(ids))
-    assert all(item.attributes["aria-labelledby"] in ids for item in page.of("section"))
-    assert [len(page.of(tag)) for tag in ("header", "main", "footer", "h1")] == [1, 1, 1, 1]
-    for item in page.of("svg"):
-        hidden = item.attributes.get("aria-hidden") == "true"
-        assert hidden != (item.attributes.get("role") == "img" and bool(item.attributes.get("aria-label")))
-    captioned = [item.parents[-1] for item in page.of("caption")]
-    assert all(any(table is other for other in captioned) for table in page.of("table"))
-    assert all("scope" in item.attributes for item in page.of("th"))
-    for item in page.of("input") + page.of("select"):
-        assert any(parent.tag == "label" for parent in item.parents)
+    assert_named_for_a_screen_reader(Page((root / REPORT).read_text()))
 
 
 def test_frames_are_shown_with_what_makes_them_again(tiny, cli, tmp_path):

@@ -11,7 +11,7 @@ from pipelines.nightly.history import History
 from pipelines.nightly.page.findings import CHANGED
 from pipelines.nightly.page.write import MOST_PICTURES, write_page
 from tests.pipelines.nightly.page import synthetic
-from tests.pipelines.pages.parsed import Page
+from tests.pipelines.pages.parsed import Page, assert_named_for_a_screen_reader
 
 MOST_BYTES = 1_500_000
 HOSTILE = "\"'><script>alert(1)</script><img src=x onerror=alert(1)>&amp;"
@@ -60,24 +60,7 @@ def test_nothing_is_loaded_and_no_text_is_run(small):
 
 def test_everything_has_a_name_for_a_screen_reader(small):
     _, text = small
-    page = Page(text)
-    ids = [item.attributes["id"] for item in page.all if "id" in item.attributes]
-    assert len(ids) == len(set(ids))
-    for item in page.all:
-        for name in ("aria-labelledby", "aria-describedby"):
-            assert item.attributes.get(name, ids[0]) in ids
-        href = item.attributes.get("href", "#")
-        assert href == "#" or href.startswith("data:") or href[1:] in ids
-    assert all("aria-labelledby" in item.attributes for item in page.of("section"))
-    assert [len(page.of(tag)) for tag in ("header", "main", "footer", "h1")] == [1, 1, 1, 1]
-    for item in page.of("svg"):
-        hidden = item.attributes.get("aria-hidden") == "true"
-        assert hidden != (item.attributes.get("role") == "img" and bool(item.attributes.get("aria-label")))
-    captioned = [item.parents[-1] for item in page.of("caption")]
-    assert all(any(table is other for other in captioned) for table in page.of("table"))
-    assert all("scope" in item.attributes for item in page.of("th"))
-    for item in page.of("input") + page.of("select"):
-        assert any(parent.tag == "label" for parent in item.parents)
+    assert_named_for_a_screen_reader(Page(text))
 
 
 def test_the_verdict_and_the_gates_are_told(small):
