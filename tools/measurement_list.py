@@ -98,7 +98,7 @@ MEASUREMENTS = (
     ),
     Measurement(
         "exact-points",
-        "exact points to 85 degrees (100 where the lens sees them), 2000 problems a lens",
+        "exact points to 85 degrees (100 where the lens sees them, 70 for pinhole_radial), 2000 problems a lens",
         ("python -m pytest tests/eposit/test_solver.py",),
     ),
     Measurement(
