@@ -1,4 +1,4 @@
-"""EPOSIT: absolute camera pose for pinhole and fish-eye cameras (NumPy and SciPy only)."""
+"""EPOSIT: absolute camera pose for pinhole and fish-eye cameras (NumPy, SciPy and Numba)."""
 
 # The compared solvers are imported here, so that `eposit.opnp.solve` works after `import eposit`. Little is gained by
 # importing them later: of the 490 ms of processor time that `import eposit` takes, NumPy has 105, SciPy 305 and these

@@ -34,7 +34,7 @@ def test_help_loads_nothing_heavy():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def test_eposit_needs_numpy_and_scipy_only():
+def test_eposit_needs_numpy_scipy_and_numba_only():
     code = (
         "import sys, eposit\n"
         "ours = {'datasets', 'render', 'pipelines'}\n"
@@ -42,6 +42,10 @@ def test_eposit_needs_numpy_and_scipy_only():
         "assert not other, other"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_numba_is_loaded_by_the_first_solve_only():
+    subprocess.run([sys.executable, "-c", "import sys, eposit; assert 'numba' not in sys.modules"], check=True)
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -54,6 +58,7 @@ def test_every_command_has_help_and_an_example(name):
 # Functions that may be longer than 60 lines, and why.
 LONG = {
     "solve": "half of it is the contract that users read",
+    "derivatives": "one pass over the points, with all sums in local variables: a sum in memory would wait for it",
 }
 
 

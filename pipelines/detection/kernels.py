@@ -11,14 +11,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
 
-from pipelines.detection.kernel_cache import choose_folder, numba_keeps_in
+from eposit.compiled.cache import choose_folder, numba_keeps_in
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-_folder = cache(choose_folder)
+PACKAGE = Path(__file__).parent
+
+
+@cache
+def _folder() -> Path | None:
+    return choose_folder(PACKAGE)
 
 
 def compiled(function: Function) -> Function:

@@ -4,18 +4,13 @@ import numpy as np
 import pytest
 from scipy.optimize import approx_fprime
 
-from eposit import Camera, solve
-from eposit.pose import PoseBatch, rotation_error_rad, rotation_from_vector
-from eposit.rays import onto_image_circle, unit_rays
+from eposit import Camera
+from eposit.pose import PoseBatch, rotation_from_vector
 from eposit.refine import ldl6
 from eposit.refine.minimise import descend
-from eposit.refine.reprojection import Observations, cost, equations, gradient, residuals
+from eposit.refine.reprojection import Observations, equations, gradient, residuals
 from eposit.refine.weights import whitening
-from eposit.shape import Shape
-from eposit.starts import other_starts
-from eposit.starts.p3p import p3p_poses, ray_misfit
-from eposit.starts.quartic_roots import quartic_roots
-from tests.cameras import ALL_CAMERAS, PAPER_OBJECT, paper_camera, random_object, random_pose
+from tests.cameras import ALL_CAMERAS, paper_camera, random_object, random_pose
 
 
 def scene(camera: Camera, count: int, n: int = 5, noise: float = 0.4, ratio: float = 0.1, points=None):
@@ -81,27 +76,6 @@ def test_systems_of_six_are_those_of_lapack():
     assert np.isnan(ldl6.inverse(singular)[..., 0]).all()
 
 
-def test_quartic_roots_are_those_of_the_companion_matrix():
-    rng = np.random.default_rng(23)
-    rising = rng.normal(size=(5, 2000))
-    found = np.sort(quartic_roots(list(rising)), axis=0)
-    expected = np.sort(np.array([np.roots(one[::-1]).real for one in rising.T]), axis=1).T
-    # A real part enters twice; near-double roots are good to the square root of the precision.
-    assert np.quantile(np.abs(found - expected).max(axis=0), 0.99) < 1e-9
-    np.testing.assert_allclose(found, expected, atol=1e-5, rtol=1e-5)
-
-
-@pytest.mark.parametrize("lens", ["perspective", "equidistance"])
-def test_a_triangle_has_the_true_pose_among_its_own(lens):
-    camera = paper_camera(lens)
-    points, R, _, pixels = scene(camera, 200, 4, 0.0)
-    ((found, _),) = p3p_poses(points, camera.bearing(pixels).transpose(1, 2, 0), 1)
-    errors = rotation_error_rad(found.transpose(2, 0, 1), R)
-    # Cosines of angles of 0.1 rad lose two digits, roots near each other up to half of the rest.
-    assert np.median(errors) < 1e-10
-    assert np.quantile(errors, 0.95) < 1e-7
-
-
 def test_steps_with_one_matrix_end_where_steps_with_their_own_do():
     camera = paper_camera("equisolid")
     points, R, t, pixels = scene(camera, 60, 6)
@@ -122,27 +96,3 @@ def test_steps_with_one_matrix_end_where_steps_with_their_own_do():
     scale = np.sqrt(np.einsum("iib->ib", exact))
     # The matrix is taken within 1e-3 rad of the minimum; depths of far points multiply that.
     np.testing.assert_allclose(found / scale[:, None] / scale, exact / scale[:, None] / scale, atol=2e-2)
-
-
-@pytest.mark.parametrize("noise", [0.0, 0.4])
-def test_a_pose_that_counts_as_sure_is_the_best_of_all_starts(noise):
-    """The search that is left out, made: no start of a sure problem leads to a lower cost."""
-    sure = 0
-    for lens in ("perspective", "orthogonal"):
-        for ratio in (0.03, 0.1, 0.3):
-            for obj in (None, PAPER_OBJECT):
-                camera = paper_camera(lens)
-                points, _, _, pixels = scene(camera, 200, 4, noise, ratio, obj)
-                shape, every = Shape.of(points), Observations.of(camera, points, pixels, whitening(None, 4))
-                rays = unit_rays(camera, onto_image_circle(camera, every.seen))
-                found = solve(points, pixels, camera).cam_from_obj
-                R, t = columns(found.R, found.t)
-                good = np.flatnonzero(shape.sure(R, t, ray_misfit(points, rays, R, t)))
-                view = Observations.of(camera, points, pixels[good], whitening(None, 4))
-                lowest = cost(residuals(view, R[..., good], t[:, good]))
-                for start in other_starts(shape, rays[..., good]):
-                    other = descend(view, start)
-                    # Rounding of costs: 1e-12 relative, and of residuals of 1e-13 px squared.
-                    assert not np.any(other.poses.converged & (other.cost < lowest * (1.0 - 1e-9) - 1e-20))
-                sure += len(good)
-    assert sure > 500

@@ -1,4 +1,4 @@
-"""The folder in which compiled functions are kept for later runs: one for each state of this package's sources.
+"""The folder in which compiled functions are kept for later runs: one for each state of their package's sources.
 
 Numba compiles a function anew when the file that holds it has changed, but not when a function that it calls has
 changed in another file: the old machine code would be loaded, with the old function in it. So the folder's name is a
@@ -20,14 +20,13 @@ import llvmlite
 from numba.core import config
 from numba.misc.appdirs import AppDirs
 
-PACKAGE = Path(__file__).parent
 PREFIX = "eposit-kernels-"
 OPTIONS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "BOUNDSCHECK")  # of Numba's environment, which shape machine code
 OLD_S = 86400.0  # since the last change: a process with these sources has compiled what it needs long ago
 
 
-def choose_folder(package: Path = PACKAGE) -> Path | None:
-    """Folder, made if need be, for what this package compiles; None where no place can be written.
+def choose_folder(package: Path) -> Path | None:
+    """Folder, made if need be, for what the package in this folder compiles; None where no place can be written.
 
     The places are, in this order: NUMBA_CACHE_DIR where it is set, beside the source, the user's own cache, a folder
     of this user among the temporary files.
