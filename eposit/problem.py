@@ -125,6 +125,9 @@ LENS_KINDS = {
     "equisolid": layout.EQUISOLID,
     "orthogonal": layout.ORTHOGONAL,
     "kannala_brandt": layout.POLYNOMIAL,
+    "pinhole_radial": layout.PINHOLE_RADIAL,
+    "eucm": layout.EUCM,
+    "double_sphere": layout.DOUBLE_SPHERE,
 }
 BEYOND = 0.1  # by which the cosine of a point may be below that of the lens's largest angle: noise at the rim
 

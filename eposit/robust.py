@@ -37,8 +37,12 @@ def solve_robust(
             f"robust=True was given {n} points; it takes {LEAST_POINTS} or more, so that with two exchanged three of "
             "the others give a pose and three confirm it: give more points or leave robust out"
         )
-    inliers = np.empty(pixels.shape[:2], np.bool_)
-    find_inliers(workspace(camera, n), n, obj, pixels, weights, variance, inliers)
+    w, there = workspace(camera, n), np.empty(pixels.shape[:2])
+    find_inliers(
+        w.ctypes.data, n, obj.ctypes.data, pixels.ctypes.data, weights.ctypes.data, len(weights), len(pixels),
+        variance, there.ctypes.data,
+    )  # fmt: skip
+    inliers = there == 1.0
     kinds, which = np.unique(inliers, axis=0, return_inverse=True)
     rows = [np.flatnonzero(which.reshape(-1) == i) for i in range(len(kinds))]
     parts = [

@@ -7,19 +7,16 @@ from numpy.typing import ArrayLike
 
 from eposit.arrays import Array, Mask
 from eposit.camera import Camera
-from eposit.pose import Pose
+from eposit.compiled.layout import LINEAR_RESULT, RESULT
 from eposit.problem import as_bearings, as_object, as_pixels, as_weights, workspace
+from eposit.results import solve_batch, solve_one
 from eposit.robust import solve_robust
-from eposit.solution import Alternatives, Solution, Status, status_names
+from eposit.solution import Solution
 
 METHODS = ("best", "centred", "eposit", "posit")
 LINEAR = {"posit": 0, "eposit": 1, "centred": 2}
-ALTERNATIVES = 3  # other minima that are returned: few problems have more
 DECISIVE = 2.0 * np.log(100.0)  # -2 log of the likelihood ratio of two minima from which the data decide: 100 to 1
 BENT = np.log(2.0)  # |log| of cost over parabola at two standard deviations from which the covariance is unreliable
-NO_COVARIANCE = np.broadcast_to(np.nan, (6, 6))
-NO_ALTERNATIVES = Alternatives.none()
-STATUS_OF = tuple(Status)
 
 
 def solve(
@@ -103,29 +100,15 @@ def _best(
 ) -> Solution:
     from eposit.compiled.best import solve_best
 
-    n, b = len(obj), len(pixels)
-    codes, iterations, flags = np.empty(b, np.int8), np.empty(b, np.int64), np.empty((b, 2), np.bool_)
-    R, t, covariance, rmse = np.empty((b, 3, 3)), np.empty((b, 3)), np.empty((b, 6, 6)), np.empty(b)
-    other_R, other_t = np.empty((b, ALTERNATIVES, 3, 3)), np.empty((b, ALTERNATIVES, 3))
-    costs = np.empty((b, 1 + ALTERNATIVES))
-    solve_best(
-        workspace(camera, n), n, obj, pixels, weights, variance, refine, DECISIVE, BENT,
-        codes, R, t, covariance, rmse, iterations, other_R, other_t, costs, flags,
-    )  # fmt: skip
-    if variance > 0.0 and variance != 1.0:
-        costs /= variance
-    if single:
-        others = Alternatives(Pose(other_R[0], other_t[0]), costs[0, 1:])
-        ambiguous, unreliable = flags[0].tolist()
-        return Solution(
-            STATUS_OF[codes[0]], Pose(R[0], t[0]), int(iterations[0]), float(rmse[0]), covariance[0],
-            np.ones(n, np.bool_), float(costs[0, 0]), others, ambiguous, unreliable,
+    n, w = len(obj), workspace(camera, len(obj))
+
+    def run(pixels: Array, out: Array) -> None:
+        solve_best(
+            w.ctypes.data, n, obj.ctypes.data, pixels.ctypes.data, weights.ctypes.data, len(weights), len(pixels),
+            variance, refine, DECISIVE, BENT, out.ctypes.data,
         )  # fmt: skip
-    others = Alternatives(Pose(other_R, other_t), costs[:, 1:])
-    return Solution(
-        status_names(codes), Pose(R, t), iterations, rmse, covariance, np.ones((b, n), np.bool_),
-        costs[:, 0], others, flags[:, 0], flags[:, 1],
-    )  # fmt: skip
+
+    return (solve_one if single else solve_batch)(run, pixels, RESULT, variance or 1.0)
 
 
 def _linear(
@@ -140,24 +123,16 @@ def _linear(
 ) -> Solution:
     from eposit.compiled.linear import solve_linear
 
-    n, b = len(obj), len(pixels)
+    n, w = len(obj), workspace(camera, len(obj))
     shift_x = shift_y = 0.0
     if theta_centre is not None:
         shift_x = (theta_centre[0] - camera.cx) / camera.fx
         shift_y = (theta_centre[1] - camera.cy) / camera.fy
-    codes, iterations = np.empty(b, np.int8), np.empty(b, np.int64)
-    R, t, rmse = np.empty((b, 3, 3)), np.empty((b, 3)), np.empty(b)
-    solve_linear(
-        workspace(camera, n), n, obj, pixels, method, tol, max_iterations, shift_x, shift_y,
-        codes, R, t, rmse, iterations,
-    )  # fmt: skip
-    if single:
-        cost = n * float(rmse[0]) ** 2
-        return Solution(
-            STATUS_OF[codes[0]], Pose(R[0], t[0]), int(iterations[0]), float(rmse[0]), NO_COVARIANCE,
-            np.ones(n, np.bool_), cost, NO_ALTERNATIVES,
+
+    def run(pixels: Array, out: Array) -> None:
+        solve_linear(
+            w.ctypes.data, n, obj.ctypes.data, pixels.ctypes.data, len(pixels), method, tol, max_iterations,
+            shift_x, shift_y, out.ctypes.data,
         )  # fmt: skip
-    covariance = np.broadcast_to(np.nan, (b, 6, 6))
-    return Solution(
-        status_names(codes), Pose(R, t), iterations, rmse, covariance, np.ones((b, n), np.bool_), n * rmse**2
-    )
+
+    return (solve_one if single else solve_batch)(run, pixels, LINEAR_RESULT, 1.0)

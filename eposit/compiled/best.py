@@ -5,18 +5,31 @@ from __future__ import annotations
 import math
 
 from eposit.compiled.descent import moved
-from eposit.compiled.jit import NUMBER, WHOLE, W, compiled, entry, part, pointer
+from eposit.compiled.kernel import NOTHING, NUMBER, POINTER, TRUTH, WHOLE, W, compiled
 from eposit.compiled.layout import (
+    ALTERNATIVES,
+    AMBIGUOUS,
     CENTRE,
     COSTS,
+    COVARIANCE,
     FACTORS,
     HESSIAN,
+    ITERATIONS,
+    KNOWN,
     MINIMA,
     MOVE,
+    OTHER,
+    OTHERS,
+    POSE,
+    PRICE,
     PROPOSAL,
+    RESULT,
+    RMSE,
     SCRATCH,
     SIZE,
+    STATUS,
     STEPS,
+    UNRELIABLE,
 )  # fmt: skip
 from eposit.compiled.linear6 import inverse
 from eposit.compiled.model import cost_at
@@ -70,9 +83,9 @@ def departure(w, n, variance):
     return worst
 
 
-@part
-def write_covariance(w, scale, out, row):
-    """In row `row` of out (b, 6, 6) scale times the inverse Hessian at HESSIAN, for the object's own origin and unit.
+@compiled(NOTHING, W, NUMBER, POINTER, WHOLE)
+def write_covariance(w, scale, out, place):
+    """At `place` of out (6, 6) scale times the inverse Hessian at HESSIAN, for the object's own origin and unit.
 
     t = c - R m moves by dc + [R m]_x r with the centroid c and the rotation vector r.
     """
@@ -88,74 +101,76 @@ def write_covariance(w, scale, out, row):
         w[C + 24 + j] = size * w[C + 24 + j] + m2 * a - m0 * c
         w[C + 30 + j] = size * w[C + 30 + j] - m1 * a + m0 * b
     for i in range(6):  # and that times T^T
-        p = C + 6 * i
+        p, q = C + 6 * i, place + 6 * i
         a, b, c = w[p], w[p + 1], w[p + 2]
-        out[row, i, 0], out[row, i, 1], out[row, i, 2] = scale * a, scale * b, scale * c
-        out[row, i, 3] = scale * (size * w[p + 3] - m2 * b + m1 * c)
-        out[row, i, 4] = scale * (size * w[p + 4] + m2 * a - m0 * c)
-        out[row, i, 5] = scale * (size * w[p + 5] - m1 * a + m0 * b)
+        out[q], out[q + 1], out[q + 2] = scale * a, scale * b, scale * c
+        out[q + 3] = scale * (size * w[p + 3] - m2 * b + m1 * c)
+        out[q + 4] = scale * (size * w[p + 4] + m2 * a - m0 * c)
+        out[q + 5] = scale * (size * w[p + 5] - m1 * a + m0 * b)
 
 
-@part
-def write_others(w, known, R, t, costs, row):
-    """In row `row` of R (b, k, 3, 3), t (b, k, 3) and costs (b, 1 + k) the minima after the lowest, then NaN."""
-    for k in range(len(costs[row]) - 1):
-        pose = MINIMA + 12 * (k + 1)
+@compiled(NOTHING, W, WHOLE, POINTER, WHOLE)
+def write_others(w, known, out, place):
+    """At `place` of out the minima after the lowest of `known`, then NaN."""
+    for k in range(ALTERNATIVES):
+        pose, there = MINIMA + 12 * (k + 1), place + OTHER * k
         if k + 1 >= known:
-            no_pose(pointer(w), pose)
+            no_pose(w, pose)
             w[COSTS + k + 1] = math.nan
-        write_pose(w, pose, R[row], t[row], k)
-        costs[row, k + 1] = w[COSTS + k + 1]
+        write_pose(w, pose, out, there)
+        out[there + 12] = w[COSTS + k + 1]
 
 
-@entry(
-    "void(f8[::1],i8,f8[:,::1],f8[:,:,::1],f8[:,::1],f8,b1,f8,f8,i1[::1],f8[:,:,::1],f8[:,::1],f8[:,:,::1],f8[::1],"
-    "i8[::1],f8[:,:,:,::1],f8[:,:,::1],f8[:,::1],b1[:,::1])"
-)
-def solve_best(
-    w, n, points, pixels, weights, variance, refine, decisive, bent, status, R, t, covariance, rmse, iterations,
-    other_R, other_t, costs, flags,
-):  # fmt: skip
-    """Solve b images of the same points.
+@compiled(TRUTH, W, WHOLE, NUMBER, NUMBER)
+def undecided(w, n, variance, decisive):
+    """Whether the second minimum is nearly as likely as the first: -2 log of the likelihood ratio is below decisive."""
+    gap = w[COSTS + 1] - w[COSTS]
+    if variance > 0.0:
+        return gap < decisive * variance
+    least = n * FLOOR_PX * FLOOR_PX
+    return (2.0 * n - 6.0) * math.log(1.0 + gap / (w[COSTS] + least)) < decisive
 
-    w: workspace with LENS and INTRINSICS written. weights (m, 3): inverse covariances in px^-2 (xx, xy, yy), m = n or 1
-    for all points. variance: what the weights are to be divided by, px^2; 0 where it is unknown and the residuals tell.
-    decisive: -2 log of the likelihood ratio below which two minima are not decided. bent: `departure` above which the
-    covariance is unreliable. costs (b, 1 + k): of the pose, then of the k alternatives. flags (b, 2): ambiguous,
-    covariance unreliable.
+
+@compiled(WHOLE, W, WHOLE, WHOLE, POINTER, WHOLE, WHOLE)
+def find_minima(w, n, whole, pixels, row, refine):
+    """The status of the image `row`; its minima where that is OK, else NaN for the first. whole: from `describe`."""
+    state, w[STEPS] = observe(w, n, pixels, row, IMAGE_CIRCLE_ALLOWANCE), 0.0
+    if state == OK and whole != DESCRIBED:
+        state = COPLANAR if whole == ON_A_LINE else TOO_FEW
+    w[KNOWN] = 0.0
+    if state == OK:
+        w[KNOWN] = all_minima(w, n, refine)
+        state = OK if w[KNOWN] > 0.0 else NOT_CONVERGED
+    if state != OK:
+        no_pose(w, MINIMA)
+        w[COSTS] = w[FACTORS + 36] = math.nan
+    return state
+
+
+@compiled(NOTHING, W, WHOLE, POINTER, POINTER, POINTER, WHOLE, WHOLE, NUMBER, WHOLE, NUMBER, NUMBER, POINTER)
+def solve_best(w, n, points, pixels, weights, m, b, variance, refine, decisive, bent, out):
+    """Solve b images of the same points into out (b, RESULT).
+
+    w: workspace with LENS and INTRINSICS written. points (n, 3); pixels (b, n, 2); weights (m, 3): inverse covariances
+    in px^-2 (xx, xy, yy), m = n or 1 for all points. variance: what the weights are to be divided by, px^2; 0 where it
+    is unknown and the residuals tell. refine: 1 to descend to minima. decisive: -2 log of the likelihood ratio below
+    which two minima are not decided. bent: `departure` above which the covariance is unreliable.
     """
-    p = pointer(w)
     place(w, n, points)
-    whole = describe(p, n)
-    weigh(w, n, weights)
-    plain = len(weights) == 1 and weights[0, 0] == 1.0 and weights[0, 1] == 0.0 and weights[0, 2] == 1.0
-    dof = 2.0 * n - 6.0
-    for row in range(len(pixels)):
-        state, known = observe(w, n, pixels, row, IMAGE_CIRCLE_ALLOWANCE), 0
-        w[STEPS] = 0.0
-        if state == OK and whole != DESCRIBED:
-            state = COPLANAR if whole == ON_A_LINE else TOO_FEW
-        if state == OK:
-            known = all_minima(p, n, 1 if refine else 0)
-            state = OK if known > 0 else NOT_CONVERGED
-        if known == 0:
-            no_pose(p, MINIMA)
-            w[COSTS] = w[FACTORS + 36] = math.nan
-        cost = w[COSTS]
-        status[row], iterations[row] = state, int(w[STEPS])
-        write_pose(w, MINIMA, R, t, row)
-        scale = variance if variance > 0.0 else cost / dof
-        inverse(p, FACTORS, HESSIAN)
-        flags[row, 0] = False
-        flags[row, 1] = known > 0 and refine and departure(p, n, max(scale, FLOOR_PX * FLOOR_PX)) > bent
-        write_covariance(w, scale, covariance, row)
-        rmse[row] = math.sqrt((cost if plain or known == 0 else squares_px(p, n, MINIMA)) / n)
-        costs[row, 0] = cost
-        write_others(w, known, other_R, other_t, costs, row)
-        if known > 1:
-            least = n * FLOOR_PX * FLOOR_PX
-            gap = w[COSTS + 1] - cost
-            if variance > 0.0:
-                flags[row, 0] = gap < decisive * variance
-            else:
-                flags[row, 0] = dof * math.log(1.0 + gap / (cost + least)) < decisive
+    whole = describe(w, n)
+    weigh(w, n, weights, m)
+    plain = m == 1 and weights[0] == 1.0 and weights[1] == 0.0 and weights[2] == 1.0
+    for row in range(b):
+        o = RESULT * row
+        state = find_minima(w, n, whole, pixels, row, refine)
+        known, cost = int(w[KNOWN]), w[COSTS]
+        out[o + STATUS], out[o + ITERATIONS], out[o + PRICE] = state, w[STEPS], cost
+        write_pose(w, MINIMA, out, o + POSE)
+        scale = variance if variance > 0.0 else cost / (2.0 * n - 6.0)
+        inverse(w, FACTORS, HESSIAN)
+        bends = known > 0 and refine == 1 and departure(w, n, max(scale, FLOOR_PX * FLOOR_PX)) > bent
+        out[o + UNRELIABLE] = 1.0 if bends else 0.0
+        out[o + AMBIGUOUS] = 1.0 if known > 1 and undecided(w, n, variance, decisive) else 0.0
+        write_covariance(w, scale, out, o + COVARIANCE)
+        out[o + RMSE] = math.sqrt((cost if plain or known == 0 else squares_px(w, n, MINIMA)) / n)
+        write_others(w, known, out, o + OTHERS)

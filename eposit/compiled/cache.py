@@ -1,80 +1,73 @@
-"""The folder in which compiled functions are kept for later runs: one for each state of their package's sources.
+"""The user's cache of machine code: a file for each function, named by all that shapes it.
 
-Numba compiles a function anew when the file that holds it has changed, but not when a function that it calls has
-changed in another file: the old machine code would be loaded, with the old function in it. So the folder's name is a
-hash of all of the package's sources, and of what else shapes the machine code and is not compared by Numba.
+The name holds a hash of the package's sources, of LLVM's version and of the processor; a file begins with a hash of
+its content, so that half a file is no file.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
-import shutil
+import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
-import llvmlite
-from numba.core import config
-from numba.misc.appdirs import AppDirs
-
-PREFIX = "eposit-kernels-"
-OPTIONS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "BOUNDSCHECK")  # of Numba's environment, which shape machine code
-OLD_S = 86400.0  # since the last change: a process with these sources has compiled what it needs long ago
+OLD_S = 30 * 86400.0  # files of other sources go when they are so old; who needs one compiles again
 
 
-def choose_folder(package: Path) -> Path | None:
-    """Folder, made if need be, for what the package in this folder compiles; None where no place can be written.
+class Cache:
+    """Machine code of one state of a package's sources."""
 
-    The places are, in this order: NUMBA_CACHE_DIR where it is set, beside the source, the user's own cache, a folder
-    of this user among the temporary files.
-    """
-    name = PREFIX + hash_of_sources(package)
-    beside = package / "__pycache__"
-    for place in _places(beside):
-        folder = place / name
-        is_new = not folder.exists()
-        if _can_write(folder):
-            if is_new and place == beside:  # other places may hold the folders of other checkouts
-                remove_old(place, folder)
-            return folder
-    return None
+    def __init__(self, package: Path, target: tuple[str, ...]):
+        """package: the folder with the sources. target: what else shapes the code."""
+        digest = hashlib.sha256(repr(target).encode())
+        for path in sorted(package.glob("*.py")):
+            content = path.read_bytes()
+            digest.update(f"{path.name} {len(content)} ".encode() + content)
+        self._hash = digest.hexdigest()[:16]
 
+    def read(self, name: str) -> bytes | None:
+        """What was kept under the name; None where there is nothing, or not the whole."""
+        for folder in folders():
+            try:
+                content = (folder / self._file(name)).read_bytes()
+            except OSError:
+                continue
+            if hashlib.sha256(content[32:]).digest() == content[:32]:
+                return content[32:]
+        return None
 
-def hash_of_sources(package: Path) -> str:
-    """Of the names and contents of a package's files, of LLVM's version and of the options that shape its code."""
-    digest = hashlib.sha256(repr((llvmlite.__version__, *(getattr(config, name) for name in OPTIONS))).encode())
-    for path in sorted(package.glob("*.py")):
-        content = path.read_bytes()
-        digest.update(f"{path.name} {len(content)} ".encode() + content)
-    return digest.hexdigest()[:16]
+    def write(self, name: str, code: bytes) -> None:
+        """Keep it in the first folder that can be written; nowhere if none can."""
+        for folder in folders():
+            try:
+                folder.mkdir(parents=True, exist_ok=True)
+                _write_whole(folder / self._file(name), hashlib.sha256(code).digest() + code)
+            except OSError:
+                continue
+            _remove_old(folder)
+            return
 
-
-def remove_old(place: Path, keep: Path) -> None:
-    """Remove the folders of other sources that nothing has been added to for a day.
-
-    A process that still uses one loses nothing: Numba compiles what it does not find, and makes its folder anew.
-    """
-    for folder in place.glob(PREFIX + "*"):
-        try:
-            newest = max(path.stat().st_mtime for path in (folder, *folder.rglob("*")))
-        except OSError:  # somebody else is removing it
-            continue
-        if folder != keep and newest < time.time() - OLD_S:
-            shutil.rmtree(folder, ignore_errors=True)
+    def _file(self, name: str) -> str:
+        return f"{name}-{self._hash}.machine-code"
 
 
-@contextmanager
-def numba_keeps_in(folder: Path) -> Iterator[None]:
-    """What is decorated with `cache=True` in the body is kept there; what other packages decorate later is not."""
-    before = config.CACHE_DIR  # pyright: ignore[reportAttributeAccessIssue]
-    config.CACHE_DIR = str(folder)  # pyright: ignore[reportAttributeAccessIssue]
-    try:
-        yield
-    finally:
-        config.CACHE_DIR = before  # pyright: ignore[reportAttributeAccessIssue]
+def folders() -> list[Path]:
+    """Where machine code may lie: the user's cache, or a folder of this user among the temporary files."""
+    own = own_temporary_folder()
+    return [*_users_cache(), *([own] if own else [])]
+
+
+def _users_cache() -> list[Path]:
+    if sys.platform == "win32":
+        place = os.environ.get("LOCALAPPDATA", "")
+    elif sys.platform == "darwin":
+        place = "~/Library/Caches"
+    else:
+        place = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
+    folder = Path(os.path.expanduser(place))
+    return [folder / "eposit"] if folder.is_absolute() else []  # it is not for a user without a home
 
 
 def own_temporary_folder() -> Path | None:
@@ -89,22 +82,17 @@ def own_temporary_folder() -> Path | None:
     return folder if mine and not folder.is_symlink() else None
 
 
-def _places(beside: Path) -> Iterator[Path]:
-    if config.CACHE_DIR:  # pyright: ignore[reportAttributeAccessIssue]
-        yield Path(config.CACHE_DIR)  # pyright: ignore[reportAttributeAccessIssue]
-    yield beside
-    users = Path(AppDirs(appname="numba", appauthor=False).user_cache_dir)
-    if users.is_absolute():  # it is not for a user without a home
-        yield users
-    own = own_temporary_folder()
-    if own is not None:
-        yield own
+def _write_whole(path: Path, content: bytes) -> None:
+    """Under a temporary name first: another process sees the whole file or none."""
+    with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
+        file.write(content)
+    os.replace(file.name, path)
 
 
-def _can_write(folder: Path) -> bool:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        tempfile.TemporaryFile(dir=folder).close()
-    except OSError:
-        return False
-    return True
+def _remove_old(folder: Path) -> None:
+    for path in folder.glob("*.machine-code"):
+        try:
+            if path.stat().st_mtime < time.time() - OLD_S:
+                path.unlink()
+        except OSError:  # somebody else is removing it
+            continue

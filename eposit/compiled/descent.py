@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from eposit.compiled.jit import NOTHING, NUMBER, WHOLE, W, compiled, part
+from eposit.compiled.kernel import NOTHING, NUMBER, WHOLE, W, compiled, part
 from eposit.compiled.layout import (
     COST,
     FLOOR,
@@ -59,7 +59,7 @@ def moved(w, pose, move, out):
         w[out + 9 + j] = w[pose + 9 + j] + w[move + 3 + j]
 
 
-@part
+@part(NUMBER, W, WHOLE)
 def _size(w, pose):
     """Of the step at MOVE the larger of the rotation, rad, and the relative translation."""
     turn = shift = far = 0.0

@@ -1,15 +1,15 @@
 """Where the numbers of one problem lie in the workspace `w`, the one array that all compiled functions share.
 
-One array and whole-number places instead of many arrays: what Numba has to compile is several times less, and so is
-what a call costs. A function's places are its arguments or the constants here; n is the number of points.
+A function's places are its arguments or the constants here; n is the number of points.
 """
 
-PERSPECTIVE, STEREOGRAPHIC, EQUISOLID, ORTHOGONAL, POLYNOMIAL = 0.0, 1.0, 2.0, 3.0, 4.0  # kinds of lens
+PERSPECTIVE, STEREOGRAPHIC, EQUISOLID, ORTHOGONAL = 0.0, 1.0, 2.0, 3.0  # kinds of lens
+POLYNOMIAL, PINHOLE_RADIAL, EUCM, DOUBLE_SPHERE = 4.0, 5.0, 6.0, 7.0  # kinds with coefficients
 LENS = 0  # (8) kind, theta_max (rad), rho_max, least cosine of a pose's points, four coefficients
 INTRINSICS = 8  # (4) fx, fy, cx, cy, px
 CENTRE = 12  # (3) centroid of the object points
 SIZE = 15  # their RMS distance from it
-ANGULAR = 36  # 1 where residuals are angles: the image is stereographic, with f = 1, and its scale is divided out
+ANGULAR, KNOWN = 36, 37  # 1 where residuals are angles: the image is stereographic, with f = 1, and its scale is divided out; minima found
 REACH, THICKNESS, FLATNESS, SOLID = 16, 17, 18, 19  # what `describe` says
 PLANE = 20  # (9) axes of the object's spread, rows of a rotation
 CORNERS = 29  # (3) three points of large area
@@ -33,3 +33,11 @@ PER_POINT = 26
 RAYS, SEEN, INFO, FLAT, OFFSETS, SOLVER, IMAGE = 3, 6, 8, 11, 13, 16, 19
 # For the search for wrong points: weights (n, 3) of points that are there, squared residuals (n), numbers to sort (n).
 WEIGHTS, RESIDUALS, SORTED = 21, 24, 25
+
+# Results of one image: a row of numbers.
+STATUS, ITERATIONS, RMSE, PRICE, AMBIGUOUS, UNRELIABLE = 0, 1, 2, 3, 4, 5  # price: the cost of the pose
+POSE = 6  # (12) R row by row, then t, in the object's frame and unit
+LINEAR_RESULT = 18  # numbers of a method that states no more
+COVARIANCE = 18  # (6, 6)
+OTHERS, ALTERNATIVES, OTHER = 54, 3, 13  # (3, 13) other minima, few problems have more: pose, then cost
+RESULT = 93

@@ -4,19 +4,25 @@ from __future__ import annotations
 
 import math
 
-from eposit.compiled.jit import NUMBER, WHOLE, W, compiled, entry, pointer
+from eposit.compiled.kernel import NOTHING, NUMBER, POINTER, WHOLE, W, compiled
 from eposit.compiled.layout import (
     IMAGE,
     INFO,
+    ITERATIONS,
     LENS,
+    LINEAR_RESULT,
     MINIMA,
     PERSPECTIVE,
     POINTS,
+    POSE,
+    PRICE,
     RAYS,
     REACH,
+    RMSE,
     SEEN,
     SOLID,
     STARTS,
+    STATUS,
     STEPS,
 )  # fmt: skip
 from eposit.compiled.lens import ray
@@ -150,35 +156,42 @@ def iterate_checked(w, n, tol, max_iterations):
     return OK if misfit <= limit else INCONSISTENT
 
 
-@entry("void(f8[::1],i8,f8[:,::1],f8[:,:,::1],i8,f8,i8,f8,f8,i1[::1],f8[:,:,::1],f8[:,::1],f8[::1],i8[::1])")
-def solve_linear(w, n, points, pixels, method, tol, max_iterations, shift_x, shift_y, status, R, t, rmse, iterations):
-    """Solve b images of the same points. w: workspace with LENS and INTRINSICS written."""
-    p = pointer(w)
+@compiled(WHOLE, W, WHOLE, WHOLE, POINTER, WHOLE, WHOLE, NUMBER, NUMBER)
+def prepared(w, n, whole, pixels, row, method, shift_x, shift_y):
+    """The status of the image `row` before the iteration; at IMAGE its pinhole points. whole: from `describe`."""
+    solid = whole != TOO_FEW_POINTS and w[SOLID] == 1.0
+    state, w[STEPS] = observe(w, n, pixels, row, 0.0), 0.0
+    if state == OK and method == CENTRED:
+        if whole == DESCRIBED and centred_image(w, n) == 0:
+            state = NOT_CONVERGED
+    elif state == OK:
+        forward = rectified(w, n, method, shift_x, shift_y)
+        if solid and forward == 0:
+            state = BEYOND_90
+    if state == OK and whole == TOO_FEW_POINTS:
+        return TOO_FEW
+    if state in (OK, NOT_CONVERGED) and not solid:
+        return COPLANAR
+    return state
+
+
+@compiled(NOTHING, W, WHOLE, POINTER, POINTER, WHOLE, WHOLE, NUMBER, WHOLE, NUMBER, NUMBER, POINTER)
+def solve_linear(w, n, points, pixels, b, method, tol, max_iterations, shift_x, shift_y, out):
+    """Solve b images of the same points into out (b, LINEAR_RESULT). w: workspace with LENS and INTRINSICS written."""
     place(w, n, points)
     for i in range(3 * n):  # no weights
         w[POINTS + INFO * n + i] = 0.0
-    whole = describe(p, n)
-    solid = whole != TOO_FEW_POINTS and w[SOLID] == 1.0
-    for row in range(len(pixels)):
-        state = observe(w, n, pixels, row, 0.0)
-        w[STEPS] = 0.0
-        if state == OK and method == CENTRED:
-            if whole == DESCRIBED and centred_image(p, n) == 0:
-                state = NOT_CONVERGED
-        elif state == OK:
-            forward = rectified(p, n, method, shift_x, shift_y)
-            if solid and forward == 0:
-                state = BEYOND_90
-        if state == OK and whole == TOO_FEW_POINTS:
-            state = TOO_FEW
-        elif state in (OK, NOT_CONVERGED) and not solid:
-            state = COPLANAR
+    whole = describe(w, n)
+    for row in range(b):
+        o = LINEAR_RESULT * row
+        state = prepared(w, n, whole, pixels, row, method, shift_x, shift_y)
         if state == OK:
-            state = iterate_checked(p, n, tol, max_iterations)
+            state = iterate_checked(w, n, tol, max_iterations)
         if state == OK and method == CENTRED:
-            turn_back(p, MINIMA)
+            turn_back(w, MINIMA)
         if state != OK:
-            no_pose(p, MINIMA)
-        status[row], iterations[row] = state, int(w[STEPS])
-        write_pose(w, MINIMA, R, t, row)
-        rmse[row] = math.sqrt(squares_px(p, n, MINIMA) / n) if state == OK else math.nan
+            no_pose(w, MINIMA)
+        out[o + STATUS], out[o + ITERATIONS] = state, w[STEPS]
+        write_pose(w, MINIMA, out, o + POSE)
+        squares = squares_px(w, n, MINIMA) if state == OK else math.nan
+        out[o + RMSE], out[o + PRICE] = math.sqrt(squares / n), squares

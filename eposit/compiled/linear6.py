@@ -5,7 +5,7 @@ A factor is 42 numbers: L (6, 6), lower with a unit diagonal, then the diagonal 
 
 from __future__ import annotations
 
-from eposit.compiled.jit import NOTHING, NUMBER, WHOLE, W, compiled
+from eposit.compiled.kernel import NOTHING, NUMBER, WHOLE, W, compiled
 
 LEAST_PIVOT = 1e-13  # of its diagonal entry: a pivot below it is rounding
 

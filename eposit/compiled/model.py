@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from eposit.compiled.jit import NUMBER, WHOLE, W, compiled
+from eposit.compiled.kernel import NUMBER, WHOLE, W, compiled
 from eposit.compiled.layout import INFO, INFO_STEP, POINTS, SEEN
 from eposit.compiled.lens import radial
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from eposit.compiled.jit import NOTHING, NUMBER, WHOLE, W, compiled, part
+from eposit.compiled.kernel import NOTHING, NUMBER, POINTER, WHOLE, W, compiled, part
 from eposit.compiled.layout import (
     ANGULAR,
     CENTRE,
@@ -27,22 +27,22 @@ NOT_CONVERGED, INCONSISTENT, TOO_FEW = 5, 7, 8
 ROUNDING = 1e-15  # of a number: its last bits; at tan(theta) = rho a projection's are 1 + rho^2 times as large
 
 
-@part
+@part(NUMBER, NUMBER)
 def angle_scale2(rho2):
     """The square of a stereographic image's scale, image over angle, at the squared radius rho2."""
     return (1.0 + 0.25 * rho2) * (1.0 + 0.25 * rho2)
 
 
-@part
+@compiled(WHOLE, W, WHOLE, POINTER, WHOLE, NUMBER)
 def observe(w, n, pixels, row, allowance):
-    """The image `row` of (b, n, 2) pixels: SEEN, over the focal length, RAYS and FLOOR; its status.
+    """The image `row` of pixels (b, n, 2): SEEN, over the focal length, RAYS and FLOOR; its status.
 
     A point over the image circle, by a share of its radius up to `allowance`, counts as on it for its ray.
     """
     status, w[FLOOR] = OK, 0.0
     for i in range(n):
-        u = (pixels[row, i, 0] - w[INTRINSICS + 2]) / w[INTRINSICS]
-        v = (pixels[row, i, 1] - w[INTRINSICS + 3]) / w[INTRINSICS + 1]
+        u = (pixels[2 * (n * row + i)] - w[INTRINSICS + 2]) / w[INTRINSICS]
+        v = (pixels[2 * (n * row + i) + 1] - w[INTRINSICS + 3]) / w[INTRINSICS + 1]
         if not abs(u + v) < math.inf:
             return NON_FINITE
         e, r = POINTS + SEEN * n + 2 * i, POINTS + RAYS * n + 3 * i
@@ -65,23 +65,23 @@ def observe(w, n, pixels, row, allowance):
     return status
 
 
-@part
+@compiled(NOTHING, W, WHOLE, POINTER)
 def place(w, n, points):
     """The object points (n, 3) at POINTS."""
-    for i in range(n):
-        for axis in range(3):
-            w[POINTS + 3 * i + axis] = points[i, axis]
+    for i in range(3 * n):
+        w[POINTS + i] = points[i]
 
 
-@part
-def weigh(w, n, weights):
+@compiled(NOTHING, W, WHOLE, POINTER, WHOLE)
+def weigh(w, n, weights, m):
     """INFO of weights (m, 3), inverse covariances in px^-2 (xx, xy, yy), m = n or 1 for all points."""
     fx, fy = w[INTRINSICS], w[INTRINSICS + 1]
     for i in range(n):
-        k = min(i, len(weights) - 1)
-        for j in (POINTS + INFO * n + 3 * i, POINTS + WEIGHTS * n + 3 * i):
-            w[j], w[j + 1], w[j + 2] = weights[k, 0] * fx * fx, weights[k, 1] * fx * fy, weights[k, 2] * fy * fy
-    w[INFO_STEP] = 3.0 if len(weights) > 1 or w[ANGULAR] == 1.0 else 0.0
+        k = 3 * min(i, m - 1)
+        j, here = POINTS + INFO * n + 3 * i, POINTS + WEIGHTS * n + 3 * i
+        w[j], w[j + 1], w[j + 2] = weights[k] * fx * fx, weights[k + 1] * fx * fy, weights[k + 2] * fy * fy
+        w[here], w[here + 1], w[here + 2] = w[j], w[j + 1], w[j + 2]
+    w[INFO_STEP] = 3.0 if m > 1 or w[ANGULAR] == 1.0 else 0.0
 
 
 @compiled(NUMBER, W, WHOLE, WHOLE)
@@ -97,15 +97,15 @@ def squares_px(w, n, pose):
     return total
 
 
-@part
-def write_pose(w, pose, R, t, row):
-    """In row `row` of R (., 3, 3) and t (., 3) the pose, in the object's own frame and unit."""
+@compiled(NOTHING, W, WHOLE, POINTER, WHOLE)
+def write_pose(w, pose, out, place):
+    """At `place` of out (12) the pose, R row by row and then t, in the object's own frame and unit."""
     for i in range(3):
         part = w[SIZE] * w[pose + 9 + i]
         for j in range(3):
-            R[row, i, j] = w[pose + 3 * i + j]
+            out[place + 3 * i + j] = w[pose + 3 * i + j]
             part -= w[pose + 3 * i + j] * w[CENTRE + j]
-        t[row, i] = part
+        out[place + 9 + i] = part
 
 
 @compiled(NOTHING, W, WHOLE)

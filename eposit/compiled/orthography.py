@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from eposit.compiled.jit import NOTHING, NUMBER, WHOLE, W, compiled
+from eposit.compiled.kernel import NOTHING, NUMBER, WHOLE, W, compiled
 from eposit.compiled.layout import IMAGE, OFFSETS, POINTS, REACH, SCRATCH, SOLVER
 
 CONTRACTS = (
@@ -185,21 +185,21 @@ def write_fixed_point(w, n, pose):
     """At pose that of I and J: the defect of their right angle is shared between them."""
     size = 0.0
     for i in range(2):
-        a = AXES + 3 * i
-        long = math.sqrt(w[a] * w[a] + w[a + 1] * w[a + 1] + w[a + 2] * w[a + 2])
+        axis = AXES + 3 * i
+        long = math.sqrt(w[axis] * w[axis] + w[axis + 1] * w[axis + 1] + w[axis + 2] * w[axis + 2])
         size += long
         for k in range(3):
-            w[BEFORE + 3 * i + k] = w[a + k] / long
+            w[BEFORE + 3 * i + k] = w[axis + k] / long
     p = q = 0.0
     for k in range(3):
-        i, j = w[BEFORE + k], w[BEFORE + 3 + k]
-        p += (i + j) * (i + j)
-        q += (i - j) * (i - j)
+        a, b = w[BEFORE + k], w[BEFORE + 3 + k]
+        p += (a + b) * (a + b)
+        q += (a - b) * (a - b)
     p, q = math.sqrt(0.5 / p), math.sqrt(0.5 / q)
     for k in range(3):
-        i, j = w[BEFORE + k], w[BEFORE + 3 + k]
-        w[pose + k] = p * (i + j) + q * (i - j)
-        w[pose + 3 + k] = p * (i + j) - q * (i - j)
+        a, b = w[BEFORE + k], w[BEFORE + 3 + k]
+        w[pose + k] = p * (a + b) + q * (a - b)
+        w[pose + 3 + k] = p * (a + b) - q * (a - b)
     a, b, c = w[pose], w[pose + 1], w[pose + 2]
     x, y, z = w[pose + 3], w[pose + 4], w[pose + 5]
     w[pose + 6], w[pose + 7], w[pose + 8] = b * z - c * y, c * x - a * z, a * y - b * x

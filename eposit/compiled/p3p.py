@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from eposit.compiled.jit import NOTHING, NUMBER, WHOLE, W, compiled
+from eposit.compiled.kernel import NOTHING, NUMBER, WHOLE, W, compiled
 from eposit.compiled.layout import CORNERS, POINTS, RAYS, SCRATCH
 from eposit.compiled.quartic import quartic_roots
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from eposit.compiled.jit import NOTHING, WHOLE, W, compiled
+from eposit.compiled.kernel import NOTHING, WHOLE, W, compiled
 from eposit.compiled.layout import FLAT, PLANE, POINTS, RAYS, SCRATCH
 
 SHIFT = 1e-13  # of the trace, added to the normal matrix so that it has a factor where the data are exact

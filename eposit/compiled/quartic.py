@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from eposit.compiled.jit import NOTHING, NUMBER, WHOLE, W, compiled
+from eposit.compiled.kernel import NOTHING, NUMBER, WHOLE, W, compiled
 
 LEAD = 1e-14  # leading over largest coefficient below which a quartic counts as none
 POLISH = 3  # Newton steps on each root: the closed form cancels where roots differ much in size

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 
 from eposit.compiled.descent import copy
-from eposit.compiled.jit import NOTHING, NUMBER, WHOLE, W, compiled, entry, pointer
+from eposit.compiled.kernel import NOTHING, NUMBER, POINTER, WHOLE, W, compiled
 from eposit.compiled.layout import (
     ANGULAR,
     CORNERS,
@@ -148,45 +148,48 @@ def search_forward(w, n, least, there, variance):
         choose(w, n, m + 1)
 
 
-@entry("void(f8[::1],i8,f8[:,::1],f8[:,:,::1],f8[:,::1],f8,b1[:,::1])")
-def find_inliers(w, n, points, pixels, weights, variance, inliers):
-    """Into inliers (b, n) the points that agree on one pose: three in four or more of 8 or 9 points, half of more.
+@compiled(WHOLE, W, WHOLE, POINTER, WHOLE, POINTER, WHOLE)
+def observe_any(w, n, pixels, row, weights, m):
+    """The image `row` of pixels (b, n, 2) at SEEN, RAYS and WEIGHTS, NaN for a missing point; how many are there."""
+    there, fx, fy = 0, w[INTRINSICS], w[INTRINSICS + 1]
+    for i in range(n):
+        k, p = 3 * min(i, m - 1), 2 * (n * row + i)
+        u, v = (pixels[p] - w[INTRINSICS + 2]) / fx, (pixels[p + 1] - w[INTRINSICS + 3]) / fy
+        rho2 = u * u + v * v
+        excess, factor = math.sqrt(rho2) / w[LENS + 2], 1.0
+        if 1.0 < excess <= 1.0 + IMAGE_CIRCLE_ALLOWANCE:
+            factor = (1.0 - 1e-12) / excess
+        side, cosine = ray(w, rho2 * factor * factor)
+        seen = side < math.inf
+        there += 1 if seen else 0
+        e, r, j = POINTS + SEEN * n + 2 * i, POINTS + RAYS * n + 3 * i, POINTS + WEIGHTS * n + 3 * i
+        w[e], w[e + 1] = u if seen else 0.0, v if seen else 0.0
+        w[r], w[r + 1], w[r + 2] = u * factor * side, v * factor * side, cosine
+        over = 1.0 / angle_scale2(rho2) if w[ANGULAR] == 1.0 else 1.0
+        w[j] = weights[k] * fx * fx * over if seen else math.nan
+        w[j + 1], w[j + 2] = weights[k + 1] * fx * fy * over, weights[k + 2] * fy * fy * over
+    return there
+
+
+@compiled(NOTHING, W, WHOLE, POINTER, POINTER, POINTER, WHOLE, WHOLE, NUMBER, POINTER)
+def find_inliers(w, n, points, pixels, weights, m, b, variance, inliers):
+    """Into inliers (b, n) 1 for points that agree on one pose: three in four or more of 8 or 9, half of more.
 
     weights (m, 3): inverse covariances in px^-2, m = n or 1; variance: what they are to be divided by, px^2, 0 where it
-    is unknown. A point that is NaN or that no ray reaches counts as wrong. All True where too few are there.
+    is unknown. A point that is NaN or that no ray reaches counts as wrong. All 1 where too few are there.
     """
-    p = pointer(w)
     place(w, n, points)
-    whole = describe(p, n)
+    whole = describe(w, n)
     least = n - n // 2 if n >= 10 else n - n // 4
-    corners = w[CORNERS], w[CORNERS + 1], w[CORNERS + 2]
-    fx, fy = w[INTRINSICS], w[INTRINSICS + 1]
+    first, second, third = w[CORNERS], w[CORNERS + 1], w[CORNERS + 2]
     w[INFO_STEP] = 3.0
-    for row in range(len(pixels)):
-        there = 0
-        for i in range(n):
-            k = min(i, len(weights) - 1)
-            u = (pixels[row, i, 0] - w[INTRINSICS + 2]) / fx
-            v = (pixels[row, i, 1] - w[INTRINSICS + 3]) / fy
-            rho2 = u * u + v * v
-            excess, factor = math.sqrt(rho2) / w[LENS + 2], 1.0
-            if 1.0 < excess <= 1.0 + IMAGE_CIRCLE_ALLOWANCE:
-                factor = (1.0 - 1e-12) / excess
-            side, cosine = ray(w, rho2 * factor * factor)
-            seen = side < math.inf
-            there += 1 if seen else 0
-            e, r, j = POINTS + SEEN * n + 2 * i, POINTS + RAYS * n + 3 * i, POINTS + WEIGHTS * n + 3 * i
-            w[e], w[e + 1] = (u, v) if seen else (0.0, 0.0)
-            w[r], w[r + 1], w[r + 2] = u * factor * side, v * factor * side, cosine
-            over = 1.0 / angle_scale2(rho2) if w[ANGULAR] == 1.0 else 1.0
-            w[j] = weights[k, 0] * fx * fx * over if seen else math.nan
-            w[j + 1], w[j + 2] = weights[k, 1] * fx * fy * over, weights[k, 2] * fy * fy * over
-        found = 0
+    for row in range(b):
+        there, found = observe_any(w, n, pixels, row, weights, m), 0
         if whole == DESCRIBED and there >= least:
-            w[CORNERS], w[CORNERS + 1], w[CORNERS + 2] = corners
-            try_triangles(p, n, least)
-            found = trimmed(p, n, least)
+            w[CORNERS], w[CORNERS + 1], w[CORNERS + 2] = first, second, third
+            try_triangles(w, n, least)
+            found = trimmed(w, n, least)
         if found == 1:
-            search_forward(p, n, least, there, variance)
+            search_forward(w, n, least, there, variance)
         for i in range(n):
-            inliers[row, i] = found == 0 or w[POINTS + INFO * n + 3 * i] > 0.0
+            inliers[n * row + i] = 1.0 if found == 0 or w[POINTS + INFO * n + 3 * i] > 0.0 else 0.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from eposit.compiled.descent import MINIMUM, copy, descend
-from eposit.compiled.jit import NOTHING, NUMBER, WHOLE, W, compiled
+from eposit.compiled.kernel import NOTHING, NUMBER, WHOLE, W, compiled
 from eposit.compiled.layout import (
     COST,
     COSTS,
@@ -67,7 +67,9 @@ def centred_image(w, n):
 def turn_back(w, pose):
     """The pose in the camera that is turned by TURN becomes that in the camera itself."""
     for j in range(4):
-        p, step = (pose + j, 3) if j < 3 else (pose + 9, 1)
+        p, step = pose + j, 3
+        if j == 3:
+            p, step = pose + 9, 1
         a, b, c = w[p], w[p + step], w[p + 2 * step]
         for i in range(3):
             w[p + step * i] = w[TURN + i] * a + w[TURN + 3 + i] * b + w[TURN + 6 + i] * c

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from eposit.compiled.jit import NOTHING, WHOLE, W, compiled, part
+from eposit.compiled.kernel import NOTHING, NUMBER, WHOLE, W, compiled, part
 from eposit.compiled.layout import (
     CENTRE,
     FLAT,
@@ -28,7 +28,7 @@ COPLANAR_CONDITION = 1e4  # ratio of spreads from which points count as in one p
 S, V = SCRATCH, SCRATCH + 9  # of `spreads`
 
 
-@part
+@part(NOTHING, W, WHOLE, WHOLE, NUMBER, NUMBER)
 def _turn(w, a, b, c, s):
     w[a], w[b] = c * w[a] - s * w[b], s * w[a] + c * w[b]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from eposit.compiled.descent import copy, moved
-from eposit.compiled.jit import NOTHING, NUMBER, WHOLE, W, compiled
+from eposit.compiled.kernel import NOTHING, NUMBER, WHOLE, W, compiled
 from eposit.compiled.layout import (
     GRADIENT,
     HESSIAN,

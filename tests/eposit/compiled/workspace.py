@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ POSE = layout.STARTS  # place of a pose under test
 
 def call(function: Any, w: np.ndarray, *args: float) -> Any:
     """What a compiled function returns."""
-    return function.made.ctypes(w.ctypes.data_as(ctypes.POINTER(ctypes.c_double)), *args)
+    return function(w.ctypes.data, *args)
 
 
 def problem(camera: Camera, points: np.ndarray, pixels: np.ndarray, sigma_px: Any = None) -> np.ndarray:
