@@ -44,11 +44,11 @@ test-full: $(SETUP)  ## adds kills, a Ray cluster, and other environments: the b
 check-slow: $(SETUP)  ## kills at random moments, two commands at once
 	$(BIN)/python -m pytest -m slow
 
-test-oldest:  ## the library alone, with the oldest NumPy, SciPy and Numba that it allows
-	$(call library_tests,numba==0.60.* numpy==1.26.* scipy==1.11.*)
+test-oldest:  ## the library alone, with the oldest NumPy, SciPy and llvmlite that it allows
+	$(call library_tests,llvmlite==0.45.* numpy==1.26.* scipy==1.11.*)
 
-test-newest:  ## the library alone, with the newest NumPy, SciPy and Numba
-	$(call library_tests,numba numpy scipy)
+test-newest:  ## the library alone, with the newest NumPy, SciPy and llvmlite
+	$(call library_tests,llvmlite numpy scipy)
 
 # OpenCV is what some of the tests compare with.
 define library_tests

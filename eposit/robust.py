@@ -29,6 +29,7 @@ def solve_robust(
     Raises:
         ValueError: fewer than eight points.
     """
+    from eposit.compiled.machine_code import native
     from eposit.compiled.robust import find_inliers
 
     n = len(obj)
@@ -38,7 +39,7 @@ def solve_robust(
             "the others give a pose and three confirm it: give more points or leave robust out"
         )
     w, there = workspace(camera, n), np.empty(pixels.shape[:2])
-    find_inliers(
+    native(find_inliers)(
         w.ctypes.data, n, obj.ctypes.data, pixels.ctypes.data, weights.ctypes.data, len(weights), len(pixels),
         variance, there.ctypes.data,
     )  # fmt: skip

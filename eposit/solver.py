@@ -99,11 +99,12 @@ def _best(
     obj: Array, pixels: Array, camera: Camera, weights: Array, variance: float, refine: bool, single: bool
 ) -> Solution:
     from eposit.compiled.best import solve_best
+    from eposit.compiled.machine_code import native
 
     n, w = len(obj), workspace(camera, len(obj))
 
     def run(pixels: Array, out: Array) -> None:
-        solve_best(
+        native(solve_best)(
             w.ctypes.data, n, obj.ctypes.data, pixels.ctypes.data, weights.ctypes.data, len(weights), len(pixels),
             variance, refine, DECISIVE, BENT, out.ctypes.data,
         )  # fmt: skip
@@ -122,6 +123,7 @@ def _linear(
     single: bool,
 ) -> Solution:
     from eposit.compiled.linear import solve_linear
+    from eposit.compiled.machine_code import native
 
     n, w = len(obj), workspace(camera, len(obj))
     shift_x = shift_y = 0.0
@@ -130,7 +132,7 @@ def _linear(
         shift_y = (theta_centre[1] - camera.cy) / camera.fy
 
     def run(pixels: Array, out: Array) -> None:
-        solve_linear(
+        native(solve_linear)(
             w.ctypes.data, n, obj.ctypes.data, pixels.ctypes.data, len(pixels), method, tol, max_iterations,
             shift_x, shift_y, out.ctypes.data,
         )  # fmt: skip

@@ -1,6 +1,6 @@
 """The user's cache of machine code: a file for each function, named by all that shapes it.
 
-The name holds a hash of the package's sources, of LLVM's version and of the processor; a file begins with a hash of
+The name holds a hash of the sources, of LLVM's version and of the processor; a file begins with a hash of
 its content, so that half a file is no file.
 """
 
@@ -17,12 +17,12 @@ OLD_S = 30 * 86400.0  # files of other sources go when they are so old; who need
 
 
 class Cache:
-    """Machine code of one state of a package's sources."""
+    """Machine code of one state of the sources."""
 
-    def __init__(self, package: Path, target: tuple[str, ...]):
-        """package: the folder with the sources. target: what else shapes the code."""
+    def __init__(self, packages: set[Path], target: tuple[str, ...]):
+        """packages: the folders with the sources. target: what else shapes the code."""
         digest = hashlib.sha256(repr(target).encode())
-        for path in sorted(package.glob("*.py")):
+        for path in sorted(path for package in packages for path in package.glob("*.py")):
             content = path.read_bytes()
             digest.update(f"{path.name} {len(content)} ".encode() + content)
         self._hash = digest.hexdigest()[:16]
@@ -66,7 +66,7 @@ def _users_cache() -> list[Path]:
         place = "~/Library/Caches"
     else:
         place = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
-    folder = Path(os.path.expanduser(place))
+    folder = Path(place).expanduser()
     return [folder / "eposit"] if folder.is_absolute() else []  # it is not for a user without a home
 
 
@@ -86,7 +86,7 @@ def _write_whole(path: Path, content: bytes) -> None:
     """Under a temporary name first: another process sees the whole file or none."""
     with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
         file.write(content)
-    os.replace(file.name, path)
+    Path(file.name).replace(path)
 
 
 def _remove_old(folder: Path) -> None:

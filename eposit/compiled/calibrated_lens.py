@@ -1,6 +1,6 @@
 """Lens laws with coefficients, for one point at a time; `eposit.calibrated_lens` states them for users.
 
-s and its derivatives by q, z, qq, qz, zz, as `lens.radial` has them, and sin(theta) / rho and cos(theta), as `lens.ray`.
+s and its derivatives by q, z, qq, qz, zz, as `lens.radial`, and sin(theta) / rho and cos(theta), as `lens.ray`.
 """
 
 from __future__ import annotations

@@ -278,6 +278,4 @@ class Expressions(ast.NodeVisitor):
             return ()
         whole = self.assigned("struct", call).text
         kind = llvm_type(kernel.returns)
-        return tuple(
-            self.assigned(one, f"extractvalue {kind} {whole}, {i}") for i, one in enumerate(kernel.returns)
-        )
+        return tuple(self.assigned(one, f"extractvalue {kind} {whole}, {i}") for i, one in enumerate(kernel.returns))

@@ -1,46 +1,34 @@
 """Functions that become machine code: plain Python of numbers, loops and one or more arrays of numbers.
 
-`translate` has the rules; a function's types are in its decorator. Nothing is translated before a function is called
-from Python for the first time, and then only what that one needs.
+`translate` has the rules; a function's types are in its decorator. `machine_code.native` is what Python calls: nothing
+is translated before, and then only what that one function needs.
 """
 
 from __future__ import annotations
 
-import ctypes
-import threading
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 NUMBER, WHOLE, TRUTH, POINTER, NOTHING = "double", "i64", "i1", "ptr", "void"
 W = POINTER  # the workspace
 Returns = str | tuple[str, ...]
-C_TYPES = {NUMBER: ctypes.c_double, WHOLE: ctypes.c_int64, POINTER: ctypes.c_void_p, NOTHING: None}
 F = TypeVar("F", bound=Callable[..., Any])
 
 
+@dataclass(frozen=True, eq=False)
 class Kernel:
-    """One function with its types; several numbers may be returned, but not to Python."""
+    """One function with its types."""
 
-    def __init__(self, function: Callable[..., Any], returns: Returns, arguments: tuple[str, ...], inline: bool):
-        self.function, self.returns, self.arguments, self.inline = function, returns, arguments, inline
-        self.name = f"{function.__module__}.{function.__name__}"
-        self.__doc__ = function.__doc__
-        self._lock, self._code, self._call = threading.Lock(), None, None
+    function: Callable[..., Any]
+    returns: Returns  # a type, or several
+    arguments: tuple[str, ...]
+    inline: bool  # whether it becomes part of those that call it
 
-    def __call__(self, *arguments: Any) -> Any:
-        """Call the machine code; arrays are given by their address."""
-        return (self._call or self._load())(*arguments)
-
-    def _load(self) -> Callable[..., Any]:
-        from eposit.compiled.machine_code import MachineCode
-
-        with self._lock:
-            if self._call is None:
-                assert isinstance(self.returns, str)
-                self._code = MachineCode(self)  # lives as long as this
-                prototype = ctypes.CFUNCTYPE(C_TYPES[self.returns], *(C_TYPES[name] for name in self.arguments))
-                self._call = prototype(self._code.address)
-            return self._call
+    @property
+    def name(self) -> str:
+        """With its module, unique in a program."""
+        return f"{self.function.__module__}.{self.function.__name__}"
 
 
 def compiled(returns: Returns, *arguments: str) -> Callable[[F], F]:

@@ -7,39 +7,44 @@ from __future__ import annotations
 
 import ctypes
 import sys
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import llvmlite
 from llvmlite import binding
 
 from eposit.compiled.cache import Cache
 from eposit.compiled.expressions import LIBRARY
-from eposit.compiled.kernel import Kernel
+from eposit.compiled.kernel import NOTHING, NUMBER, POINTER, WHOLE, Kernel
+from eposit.compiled.translate import module_text
 
 SPEED = 2  # of LLVM's levels of optimisation
+C_TYPES = {NUMBER: ctypes.c_double, WHOLE: ctypes.c_int64, POINTER: ctypes.c_void_p, NOTHING: None}
 
 
-class MachineCode:
-    """A kernel in memory; `address` is valid as long as this lives."""
-
-    def __init__(self, kernel: Kernel):
-        machine = target_machine()
-        cache_ = Cache(Path(__file__).parent, (llvmlite.__version__, machine.triple, *_processor()))
-        code = cache_.read(kernel.name)
-        if code is None:
-            code = object_code(kernel)
-            cache_.write(kernel.name, code)
-        self._engine = binding.create_mcjit_compiler(binding.parse_assembly(""), machine)
-        self._engine.add_object_file(binding.ObjectFileRef.from_data(code))
-        self._engine.finalize_object()
-        self.address = self._engine.get_function_address(kernel.name)
+@cache
+def native(kernel: Kernel) -> Callable[..., Any]:
+    """The kernel as Python calls it: arrays are given by their addresses, and only one number or none is returned."""
+    machine, processor = target_machine(), _processor()
+    packages = {Path(__file__).parent, Path(kernel.function.__code__.co_filename).parent}
+    kept = Cache(packages, (llvmlite.__version__, machine.triple, *processor))
+    code = kept.read(kernel.name)
+    if code is None:
+        code = object_code(kernel)
+        kept.write(kernel.name, code)
+    engine = binding.create_mcjit_compiler(binding.parse_assembly(""), machine)
+    engine.add_object_file(binding.ObjectFileRef.from_data(code))
+    engine.finalize_object()
+    returns, *arguments = (C_TYPES[kind] for kind in (str(kernel.returns), *kernel.arguments))
+    call: Any = ctypes.CFUNCTYPE(returns, *arguments)(engine.get_function_address(kernel.name))
+    call.engine = engine  # the machine code lives as long as this
+    return call
 
 
 def object_code(kernel: Kernel) -> bytes:
     """Compiled by LLVM, in the format of the system's object files."""
-    from eposit.compiled.translate import module_text
-
     machine = target_machine()
     module = binding.parse_assembly(module_text(kernel))
     module.triple, module.data_layout = machine.triple, str(machine.target_data)

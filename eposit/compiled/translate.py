@@ -2,9 +2,10 @@
 
 A function has whole numbers (64 bits), numbers (double precision), truth values and pointers to numbers; its variables
 keep the type of their first value, and a whole number becomes a number where one is wanted, never the reverse. There
-are assignments, also of several values, `if`, `while`, `for ... in range(...)`, `break`, `continue`, `return`; arithmetic,
-comparisons, `and`, `or`, `not`, `a if b else c`, one index in brackets; `abs`, `min` and `max` of two, `int`, functions
-of `math`, and other kernels. Anything else is refused. A division by zero gives infinity or NaN, as in NumPy.
+are assignments, also of several values, `if`, `while`, `for ... in range(...)`, `break`, `continue`, `return`;
+arithmetic, comparisons, `and`, `or`, `not`, `a if b else c`, one index in brackets; `abs`, `min` and `max` of two,
+`int`, functions of `math`, and other kernels. Anything else is refused. A division by zero gives infinity or NaN, as in
+NumPy; a quotient or remainder of whole numbers is right where neither is negative.
 
 Sums and products stay in the order in which they are written: results do not depend on what LLVM could rearrange.
 """

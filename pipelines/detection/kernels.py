@@ -11,20 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
 
-from eposit.compiled.cache import choose_folder, numba_keeps_in
+from pipelines.detection.kernel_cache import choose_folder, numba_keeps_in
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-PACKAGE = Path(__file__).parent
-
-
-@cache
-def _folder() -> Path | None:
-    return choose_folder(PACKAGE)
+_folder = cache(choose_folder)
 
 
 def compiled(function: Function) -> Function:

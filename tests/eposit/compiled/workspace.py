@@ -8,6 +8,7 @@ import numpy as np
 
 from eposit import Camera, Pose
 from eposit.compiled import layout
+from eposit.compiled.machine_code import native
 from eposit.problem import as_weights, workspace
 
 POSE = layout.STARTS  # place of a pose under test
@@ -15,7 +16,7 @@ POSE = layout.STARTS  # place of a pose under test
 
 def call(function: Any, w: np.ndarray, *args: float) -> Any:
     """What a compiled function returns."""
-    return function(w.ctypes.data, *args)
+    return native(function)(w.ctypes.data, *args)
 
 
 def problem(camera: Camera, points: np.ndarray, pixels: np.ndarray, sigma_px: Any = None) -> np.ndarray:

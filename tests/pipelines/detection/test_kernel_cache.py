@@ -8,9 +8,8 @@ import time
 
 import pytest
 
-from eposit.compiled import cache
-from eposit.compiled.cache import PREFIX, choose_folder, own_temporary_folder
-from pipelines.detection import kernels
+from pipelines.detection import kernel_cache
+from pipelines.detection.kernel_cache import PREFIX, choose_folder, own_temporary_folder
 
 PART = """
 from pipelines.detection.kernels import inlined
@@ -35,13 +34,10 @@ def checkout(tmp_path):
     """A package that compiles one small function, which calls one in another file, by our decorators."""
     package = tmp_path / "checkout/pipelines/detection"
     package.mkdir(parents=True)
-    root = package.parents[1]
-    lower = root / "eposit/compiled"
-    lower.mkdir(parents=True)
-    for folder in (package, package.parent, lower, lower.parent):
+    for folder in (package, package.parent):
         (folder / "__init__.py").touch()
-    shutil.copy(kernels.__file__, package)
-    shutil.copy(cache.__file__, lower)
+    for name in ("kernels.py", "kernel_cache.py"):
+        shutil.copy(kernel_cache.PACKAGE / name, package)
     (package / "part.py").write_text(PART)
     (package / "caller.py").write_text(CALLER)
     return package
@@ -110,16 +106,16 @@ def test_where_nothing_can_be_written_functions_are_compiled_all_the_same(checko
 def test_options_and_files_that_shape_the_code_have_a_folder_each(checkout, monkeypatch):
     first = choose_folder(checkout)
     assert choose_folder(checkout) == first
-    monkeypatch.setattr(cache.config, "BOUNDSCHECK", 1)
+    monkeypatch.setattr(kernel_cache.config, "BOUNDSCHECK", 1)
     second = choose_folder(checkout)
     (checkout / "more.py").touch()
     assert len({first, second, choose_folder(checkout)}) == 3
 
 
 def test_folders_that_nothing_was_added_to_for_a_day_go_when_a_new_one_is_made(checkout, monkeypatch):
-    monkeypatch.setattr(cache.config, "CACHE_DIR", "")
+    monkeypatch.setattr(kernel_cache.config, "CACHE_DIR", "")
     place = checkout / "__pycache__"
-    long_ago = time.time() - 2 * cache.OLD_S
+    long_ago = time.time() - 2 * kernel_cache.OLD_S
     old, used, other = place / f"{PREFIX}old", place / f"{PREFIX}used", place / "other"
     for folder in (old, used, other):
         (folder / "detection").mkdir(parents=True)
@@ -132,10 +128,10 @@ def test_folders_that_nothing_was_added_to_for_a_day_go_when_a_new_one_is_made(c
 
 
 def test_what_other_packages_keep_stays_where_it_was(checkout):
-    before = cache.config.CACHE_DIR
-    with cache.numba_keeps_in(checkout):
-        assert str(checkout) == cache.config.CACHE_DIR
-    assert before == cache.config.CACHE_DIR
+    before = kernel_cache.config.CACHE_DIR
+    with kernel_cache.numba_keeps_in(checkout):
+        assert str(checkout) == kernel_cache.config.CACHE_DIR
+    assert before == kernel_cache.config.CACHE_DIR
 
 
 def test_a_folder_of_somebody_else_is_not_used(tmp_path, monkeypatch):

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from pipelines.detection.kernels import PACKAGE
+from pipelines.detection.kernel_cache import PACKAGE
 
 CODE = """
 import hashlib, sys
