@@ -70,6 +70,13 @@ def _size(w, pose):
     return math.sqrt(max(turn, shift / far))
 
 
+@part(NUMBER, NUMBER, NUMBER)
+def _limit(cost, floor):
+    """Up to which another cost is no worse: residuals r and their rounding d, whose squares add up to `floor`, give
+    (r + d)^2."""
+    return cost * (1.0 + COST_FLOOR) + 2.0 * math.sqrt(cost * floor) + floor
+
+
 @compiled(WHOLE, W, WHOLE, WHOLE)
 def is_known(w, pose, count):
     """Whether the pose is one of the `count` minima."""
@@ -142,12 +149,15 @@ def descend(w, n, pose, count, L, newton):
                 continue
         elif bad < 6:
             kicked = settled  # a saddle
+        elif damping > 0.0 and size <= SHORT:
+            damping = 0.0  # the next step tells
+            continue
         elif damping == 0.0:
             ratio = size / before if before < math.inf else 1.0
             if settled or size <= SHORT or size * (ratio * ratio if ratio < 0.1 else 1.0) <= STEP_TOL:
                 moved(w, pose, MOVE, PROPOSAL)
                 cost_new = cost_at(w, n, PROPOSAL)
-                if cost_new <= cost * (1.0 + COST_FLOOR) + floor:
+                if cost_new <= _limit(cost, floor):
                     copy(w, PROPOSAL, pose, 12)
                     cost = cost_new
                 w[COST] = cost
@@ -162,7 +172,7 @@ def descend(w, n, pose, count, L, newton):
             moved(w, pose, MOVE, PROPOSAL)
         newton_new = 1.0 if size < NEAR or step >= SLOW else 0.0
         cost_new = derivatives(w, n, PROPOSAL, newton_new, GRADIENT_NEW, HESSIAN_NEW)
-        if cost_new <= cost * (1.0 + COST_FLOOR) + floor:
+        if cost_new <= _limit(cost, floor):
             _accept(w, pose)
             cost, newton, before = cost_new, newton_new, size
             damping = 0.1 * damping if damping > 10.0 * LEAST_DAMPING else 0.0
