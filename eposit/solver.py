@@ -16,7 +16,7 @@ from eposit.solution import Solution
 METHODS = ("best", "centred", "eposit", "posit")
 LINEAR = {"posit": 0, "eposit": 1, "centred": 2}
 DECISIVE = 2.0 * np.log(100.0)  # -2 log of the likelihood ratio of two minima from which the data decide: 100 to 1
-BENT = np.log(2.0)  # |log| of cost over parabola at two standard deviations from which the covariance is unreliable
+BENT = np.log(1.5)  # |log| of cost over parabola at three standard deviations from which the covariance is unreliable
 
 
 def solve(
@@ -57,9 +57,9 @@ def solve(
     Returns:
         Solution; a batch gives the same poses as single calls, to the bit. `alternatives` has the other minima of
         "best"; `ambiguous`: the likelihood of one is more than a hundredth of the pose's. The covariance is that of
-        "best", from the curvature of the cost; `covariance_unreliable`: at two standard deviations the cost is not
-        within a factor of 2 of the parabola that it states. The other methods do not weigh their points and state
-        none: NaN.
+        "best", from the curvature of the cost, widened along the two least known rotations where the cost rises less
+        than that three standard deviations away; `covariance_unreliable`: there the cost is not within a factor of
+        1.5 of the parabola. The other methods do not weigh their points and state none: NaN.
     Raises:
         ValueError: wrong shapes, fewer than four points (eight with `robust`), non-finite object points, an unknown
             method or sigma.

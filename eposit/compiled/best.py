@@ -50,36 +50,68 @@ from eposit.compiled.shape import DESCRIBED, ON_A_LINE, describe
 
 IMAGE_CIRCLE_ALLOWANCE = 0.05  # share of the radius by which noise may lift a point over the image circle
 FLOOR_PX = 1e-6  # RMSE that counts as rounding when costs are compared
-DEVIATIONS = 2.0  # standard deviations from the minimum at which the cost is compared with its parabola
-POWER_STEPS = 4  # of the power method; any direction of large variance will do
+DEVIATIONS = 3.0  # standard deviations from the minimum at which the cost is compared with its parabola
+POWER_STEPS = 4
+WEAK, LEAST = SCRATCH, SCRATCH + 12  # (2, 6) steps along the least known rotations; least ratio along each
+LEAST_RATIO = 0.25  # by which the covariance is widened at most; it counts as unreliable long before
 
 
-@compiled(NUMBER, W, WHOLE, NUMBER)
-def departure(w, n, variance):
-    """How far the cost is from its parabola along the least known rotation.
+@compiled(NOTHING, W, WHOLE)
+def weak_step(w, k):
+    """At WEAK + 6 k a step of one standard deviation along the least known rotation (k = 0), or along the least known
+    of those that are independent of it (k = 1). The inverse Hessian is at HESSIAN.
 
-    The larger |log| of their ratio on two sides. The inverse Hessian is at HESSIAN. variance: of residuals of unit
-    weight.
+    The power method on the covariance of the rotation; any direction of large variance will do.
     """
+    C, step = HESSIAN, WEAK + 6 * k
     x, y, z = 1.0, 1.0, 1.0
-    C = HESSIAN
+    p, q, r = w[WEAK], w[WEAK + 1], w[WEAK + 2]
+    if k == 1:  # at right angles to the first
+        x, y, z = q - r, r - p, p - q
     for _ in range(POWER_STEPS):
         a = w[C] * x + w[C + 1] * y + w[C + 2] * z
         b = w[C + 6] * x + w[C + 7] * y + w[C + 8] * z
         c = w[C + 12] * x + w[C + 13] * y + w[C + 14] * z
+        if k == 1:
+            along = (p * a + q * b + r * c) / (p * p + q * q + r * r)
+            a, b, c = a - along * p, b - along * q, c - along * r
         size = math.sqrt(a * a + b * b + c * c)
         x, y, z = a / size, b / size, c / size
     for i in range(6):
-        w[SCRATCH + i] = w[C + 6 * i] * x + w[C + 6 * i + 1] * y + w[C + 6 * i + 2] * z
-    total = w[SCRATCH] * x + w[SCRATCH + 1] * y + w[SCRATCH + 2] * z
+        w[step + i] = w[C + 6 * i] * x + w[C + 6 * i + 1] * y + w[C + 6 * i + 2] * z
+    size = math.sqrt(w[step] * x + w[step + 1] * y + w[step + 2] * z)
+    for i in range(6):
+        w[step + i] /= size
+
+
+@compiled(NUMBER, W, WHOLE, NUMBER)
+def departure(w, n, variance):
+    """How far the cost is from its parabola along the two least known rotations: the largest |log| of their ratio in
+    eight directions.
+
+    The inverse Hessian is at HESSIAN; it grows along each of the two so that it states no more than the cost does.
+    variance: of residuals of unit weight.
+    """
+    weak_step(w, 0)
+    weak_step(w, 1)
     worst, expected = 0.0, DEVIATIONS * DEVIATIONS * variance
-    for side in range(2):
-        factor = (1.0 - 2.0 * side) * math.sqrt(expected / total)
+    w[LEAST] = w[LEAST + 1] = 1.0
+    for side in range(8):
+        angle = 0.25 * math.pi * side
+        first, second = math.cos(angle) * math.sqrt(expected), math.sin(angle) * math.sqrt(expected)
         for i in range(6):
-            w[MOVE + i] = factor * w[SCRATCH + i]
+            w[MOVE + i] = first * w[WEAK + i] + second * w[WEAK + 6 + i]
         moved(w, MINIMA, MOVE, PROPOSAL)
         ratio = (cost_at(w, n, PROPOSAL) - w[COSTS]) / expected
         worst = max(worst, abs(math.log(ratio)) if ratio > 0.0 else math.inf)
+        if side % 2 == 0:
+            axis = LEAST + side // 2 % 2
+            w[axis] = max(min(w[axis], ratio), LEAST_RATIO)
+    for k in range(2):
+        grow = 1.0 / w[LEAST + k] - 1.0
+        for i in range(6):
+            for j in range(6):
+                w[HESSIAN + 6 * i + j] += grow * w[WEAK + 6 * k + i] * w[WEAK + 6 * k + j]
     return worst
 
 
