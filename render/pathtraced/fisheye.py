@@ -140,6 +140,8 @@ def register_sensor() -> None:
             ray = dr.zeros(mi.Ray3f, dr.width(direction))
             ray.o, ray.d, ray.time = mi.Point3f(self.origin), dr.normalize(self.rotation @ direction), time
             ray.maxt = dr.select(seen, dr.largest(mi.Float), 0.0)
+            # A kernel of its own, so that the large one that traces the rays is compiled once for all lenses.
+            dr.eval(ray, seen)
             return ray, dr.select(seen, mi.Spectrum(1.0), mi.Spectrum(0.0))
 
         def sample_ray_differential(

@@ -63,8 +63,11 @@ def _hits(
     world_from_cam = rotation @ cam_from_obj.R.T
     origin = world_from_obj @ np.append(cam_from_obj.inverse().t, 1.0)
     direction = (bearing @ world_from_cam.T).astype(np.float32)
-    ray = mi.Ray3f(mi.Point3f(*(float(v) for v in origin[:3])), mi.Vector3f(*direction.T))
+    ray = mi.Ray3f(
+        mi.Point3f(*backend.opaque(*origin[:3])), mi.Vector3f(*(backend.upload(part) for part in direction.T))
+    )
     found = scene.ray_intersect(ray)
+    backend.jit().eval(found)  # at once: each part of it by itself would trace all rays again
     normal = np.array(found.n).T @ world_from_cam
     return np.array(found.t, np.float64) / scale, normal, _identities(scene, names, found)
 

@@ -29,6 +29,8 @@ def visible_points(
     scale = float(np.linalg.norm(world_from_obj[:3, 0]))
     direction = (way / distance[:, None]) @ (world_from_obj[:3, :3] / scale).T
     origin = world_from_obj @ np.append(centre, 1.0)
-    ray = mi.Ray3f(mi.Point3f(*(float(v) for v in origin[:3])), mi.Vector3f(*direction.T.astype(np.float32)))
-    ray.maxt = mi.Float(((distance - GAP_MM) * scale).astype(np.float32))
+    ray = mi.Ray3f(
+        mi.Point3f(*backend.opaque(*origin[:3])), mi.Vector3f(*(backend.upload(part) for part in direction.T))
+    )
+    ray.maxt = backend.upload((distance - GAP_MM) * scale)
     return facing & in_picture & ~np.array(scene.ray_test(ray)) & has_target
