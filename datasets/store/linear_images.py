@@ -21,6 +21,8 @@ from datasets.recipe.targets import target_values
 from datasets.store.atomic import replace_atomically, write_text
 from eposit import Camera
 from render.frame import LinearImage
+from render.motion import RollingPose
+from render.optics import Optics
 from render.targets.image_region import Region
 
 MASTERS = "masters"  # their folder
@@ -181,6 +183,11 @@ def linear_key(recipe: Recipe, frame: Frame) -> str:
     }
     if recipe.outputs.colour:
         parts["colour"] = True
+    if recipe.optics != Optics():
+        parts["optics"] = asdict(recipe.optics)
+    if isinstance(frame.cam_from_obj, RollingPose):
+        rate = frame.cam_from_obj.rate
+        parts["rate"] = [*rate.velocity_mm_per_s.tolist(), *rate.turn_rad_per_s.tolist()]
     if recipe.world.method != "closed":
         world, draw = asdict(recipe.world), asdict(frame.world)
         for left_out in ("exposure_range", "file"):

@@ -71,7 +71,7 @@ class RayCamera:
         row = pixel // width
         x, y = mi.Float(pixel - row * width) + spread[0] - 0.5, mi.Float(row) + spread[1] - 0.5
         rays = device.rays(x, y)
-        origin = mi.Vector3f(*device.origin) + dr.zeros(mi.Vector3f, len(pixels) * samples)
+        origin = mi.Vector3f(*rays.origin) + dr.zeros(mi.Vector3f, len(pixels) * samples)
         found = PixelRays(origin, dr.normalize(rays.direction), rays.seen, spread[2:], keyed_sampler(pixel, ray, key))
         # A kernel of its own, so that the large ones that trace the rays are compiled once for all lenses.
         dr.eval(found.origin, found.direction, found.seen, pixel, ray)
