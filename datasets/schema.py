@@ -11,7 +11,12 @@ from eposit.calibrated_lens import MOST_COEFFICIENTS
 from render.world import WorldDraw
 
 SCHEMA_VERSION = "3"
+NAN_VERSION = "2"  # had NaN for every null, and `scores` without what `SCORES_ADDED` names
+READABLE = (NAN_VERSION, SCHEMA_VERSION)
+SCORES_ADDED = ("failure_reason", "distance_mm", "field_deg", "tilt_deg")
 MEANING = b"meaning"
+
+FRAME_ID = "frame_id"  # in every table
 
 _STATUS = "ok, or the reason of failure; a failed row keeps its place with nulls"
 
