@@ -23,6 +23,9 @@ class Lens:
     cx: float
     cy: float
     k: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+    skew: float = 0.0  # px to the right for each row: a camera that pans while rows are read
+    sway: float = 0.0  # amplitude, px, to the sides while rows are read: a camera that shakes
+    sway_rows: float = 120.0
 
     def project(self, points):
         """(n, 2) px of points (n, 3) in the camera; NaN where the lens has no image."""
@@ -30,15 +33,19 @@ class Lens:
         across = np.hypot(x, y)
         angle = np.arctan2(across, z)
         radius = self._radius(angle) / np.where(across > 0.0, across, 1.0)
-        return np.stack((self.cx + self.fx * radius * x, self.cy + self.fy * radius * y), axis=1)
+        row = self.cy + self.fy * radius * y
+        return np.stack((self.cx + self.fx * radius * x + self._aside(row), row), axis=1)
 
     def rays(self, x, y):
         """Unit directions (..., 3) of pixels; NaN beyond what the lens sees."""
-        u, v = (x - self.cx) / self.fx, (y - self.cy) / self.fy
+        u, v = (x - self._aside(y) - self.cx) / self.fx, (y - self.cy) / self.fy
         radius = np.hypot(u, v)
         angle = self._angle(radius)
         scale = np.sin(angle) / np.where(radius > 0.0, radius, 1.0)
         return np.stack((scale * u, scale * v, np.cos(angle)), axis=-1)
+
+    def _aside(self, row):
+        return self.skew * (row - self.cy) + self.sway * np.sin(2.0 * np.pi * row / self.sway_rows)
 
     def _radius(self, angle):
         if self.kind == "pinhole":
