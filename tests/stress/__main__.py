@@ -48,8 +48,8 @@ def _tell(kind, rows):
     for detector, own in rows.items():
         f = figures(own)
         print(
-            f"{kind.name:24} {detector:8} found {f.found:6.3f} wrong {f.wrong:4} rms {f.rms_px:8.4f} bias {f.bias_px:8.4f} "
-            f"norm {f.normalised:6.2f} s {f.mean_s:6.2f} {f.slowest_s:6.2f} {f.status}",
+            f"{kind.name:24} {detector:8} found {f.found:6.3f} wrong {f.wrong:4} rms {f.rms_px:8.4f} "
+            f"bias {f.bias_px:8.4f} norm {f.normalised:6.2f} s {f.mean_s:6.2f} {f.slowest_s:6.2f} {f.status}",
             flush=True,
         )
     for sentence in faults(rows):

@@ -38,7 +38,7 @@ def _ours(image, board):
     try:
         found = detect_points(image, target_of(board))
     except (ValueError, TypeError):
-        return Answer(np.full((count, 2), np.nan), np.full(count, REFUSED))
+        return Answer(np.full((count, 2), np.nan), np.full(count, REFUSED), np.full((count, 2, 2), np.nan))
     return Answer(found.points_px, found.status, found.covariance_px2)
 
 

@@ -7,8 +7,8 @@ import time
 
 from tests.stress import answers
 
-LIMIT_S = 10.0  # of processor time, for one picture
-SLOWDOWN = 6.0  # by which a crowded machine may stretch it
+LIMIT_S = 5.0  # of processor time, for one picture
+SLOWDOWN = 8.0  # by which a crowded machine may stretch it
 START_S = 600.0  # for imports and kernels that are compiled at first use
 
 

@@ -27,7 +27,7 @@ class Spread:
         return int(np.ceil(5.0 * self.gaussian + self.disc + self.streak / 2.0)) + 1
 
 
-def draw(scene, width, height, spread=Spread(), finer=4):  # noqa: B008  frozen
+def draw(scene, width, height, spread=Spread(), finer=4):
     """(height, width) linear radiance; `finer` cells to a pixel along each side, each soft by its own size."""
     border = spread.reach
     fine = _fine(scene, width, height, border, finer)

@@ -15,6 +15,8 @@ from tests.stress.views import Framing, place
 
 SURE_PX = 3.0  # from the border of the picture or of a cover within which a corner counts neither as seen nor as hidden
 
+BOARD, FRAMING, SPREAD, CAMERA = Board(), Framing(), Spread(gaussian=0.7), camera()
+
 
 @dataclass(frozen=True)
 class Shot:
@@ -32,13 +34,13 @@ class Kind:
 
     name: str
     says: str  # for the table
-    board: Board | None = Board()
+    board: Board | None = BOARD
     asked: Board | None = None  # the board that is looked for, if it is another one
-    framing: Framing = Framing()
-    spread: Spread = Spread(gaussian=0.7)
+    framing: Framing = FRAMING
+    spread: Spread = SPREAD
     scene: Callable = lambda scene, rng: scene
     light: Callable = lambda linear, rng: linear  # smooth, on the picture's own pixels
-    camera: Callable = camera()
+    camera: Callable = CAMERA
     shift: Callable = lambda points: points  # of the truth, by what the camera does to it
     nothing: bool = False  # no point may be called ok
     any_turn: bool = False  # the board looks the same after half a turn, and nothing else tells
@@ -50,12 +52,12 @@ class Kind:
     @property
     def target(self):
         """The board that is looked for."""
-        return self.asked or self.board or Board()
+        return self.asked or self.board or BOARD
 
     def shot(self, view):
         """The picture of one view, the same in every run."""
         rng = np.random.default_rng([23, view])
-        lens, R, t = place(self.framing, self.board or Board(), view)
+        lens, R, t = place(self.framing, self.board or BOARD, view)
         scene = self.scene(Scene(self.board, lens, R, t), rng)
         size = self.framing.width, self.framing.height
         image = self.camera(self.light(self._linear(scene, size), rng), rng)

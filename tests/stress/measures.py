@@ -43,7 +43,11 @@ def _against(points, told, covariance, shot, part, side):
     wrong = told & (far | shot.hidden[part])
     used = told & ~wrong
     sums = {"seen": int(shot.seen[part].sum()), "found": int(np.sum(used & shot.seen[part])), "wrong": int(wrong.sum())}
-    sums |= {"used": int(used.sum()), "square": float(np.sum(error[used] ** 2)), "sum": error[used].sum(axis=0).tolist()}
+    sums |= {
+        "used": int(used.sum()),
+        "square": float(np.sum(error[used] ** 2)),
+        "sum": error[used].sum(axis=0).tolist(),
+    }
     if covariance is not None and np.any(used):
         inverse = np.linalg.inv(covariance[used])
         sums["normalised"] = float(np.einsum("ni,nij,nj->", error[used], inverse, error[used]))

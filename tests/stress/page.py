@@ -23,7 +23,8 @@ whole or not at all. *wrong*: points called `ok` that lie more than 0.3 squares 
 belong to no board. RMS of a coordinate and length of the mean error (*bias*) are in px. *norm*: RMS of the error over
 its stated deviation. OpenCV's corners are put in the order that fits the truth best; *classic* is
 `findChessboardCorners` with `cornerSubPix`, *sector* is `findChessboardCornersSB` (exhaustive, accurate). Seconds are
-processor time of one picture; 10 s is where a detector is ended. RMS *on shared* pictures is of the views that both found.
+processor time of one picture; 5 s is where a detector is ended. RMS *on shared* pictures is of
+the views that both found.
 
 Asked is: nothing wrong, found no less often and RMS no larger than OpenCV's better one, norm {NORMALISED[0]} to
 {NORMALISED[1]}, no picture above {SLOWEST_S:g} s."""
@@ -34,7 +35,13 @@ COLUMNS = ["kind", "views", "found", "classic", "sector", "wrong", "RMS", "bias"
 def write_page(found, path):
     """Rows by kind and detector as a page."""
     held = sum(not faults(rows) for rows in found.values())
-    text = [HEAD, _made(), f"{held} of {len(found)} kinds hold everything that is asked.", "## Corners", _corners(found)]
+    text = [
+        HEAD,
+        _made(),
+        f"{held} of {len(found)} kinds hold everything that is asked.",
+        "## Corners",
+        _corners(found),
+    ]
     text += ["## The circle", _discs(found), "## What is not held", _short(found), "## The kinds", _kinds(found)]
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text("\n\n".join(text) + "\n")

@@ -44,7 +44,8 @@ class Scene:
         """Radiance at places (n,) px, averaged over about `cell` px; `slopes` are those of `slopes` near by."""
         value = self.background(x, y, cell)
         near = np.isfinite(slopes[0])
-        value[near] = self._board_over(value[near], x[near], y[near], cell * slopes[:, near])
+        if np.any(near):
+            value[near] = self._board_over(value[near], x[near], y[near], cell * slopes[:, near])
         for cover in self.covers:
             inside = np.clip(0.5 + cover.depth(x, y) / cell, 0.0, 1.0) * cover.opacity
             value = value * (1.0 - inside) + cover.grey * inside * (cover.opacity == 1.0)
@@ -89,7 +90,9 @@ class Scene:
                 return value
             radius = np.hypot(p, q)
             span = np.hypot(spans[2] * p, spans[3] * q) / np.maximum(radius, 1e-9)
-            return _over(value, DISC, np.clip(0.5 + (self.board.disc_radius - radius) / np.maximum(span, 1e-9), 0.0, 1.0))
+            return _over(
+                value, DISC, np.clip(0.5 + (self.board.disc_radius - radius) / np.maximum(span, 1e-9), 0.0, 1.0)
+            )
 
     def _places(self, x, y):
         """Four of (n,) mm: where rays meet the sheet, along it, and the disc's plane, from its centre."""
