@@ -6,7 +6,7 @@ SETUP := $(VENV)/.done
 BLENDER := .venv-blender
 BLENDER_PYTHON ?= $(PYTHON)
 
-.PHONY: help setup demo nightly test test-full check-slow test-oldest test-newest lint types layers layers-picture docs bench \
+.PHONY: help setup demo nightly test test-full check-slow stress test-oldest test-newest lint types layers layers-picture docs bench \
 	bench-blender measurements wheel lock clean
 
 help:  ## this list
@@ -43,6 +43,9 @@ test-full: $(SETUP)  ## adds kills, a Ray cluster, and other environments: the b
 
 check-slow: $(SETUP)  ## kills at random moments, two commands at once
 	$(BIN)/python -m pytest -m slow
+
+stress: $(SETUP)  ## detection and OpenCV's finders on pictures as cameras spoil them; goes on where it stopped; ARGS="--views 2"
+	$(BIN)/python -m tests.stress $(ARGS)
 
 test-oldest:  ## the library alone, with the oldest NumPy, SciPy and llvmlite that it allows
 	$(call library_tests,llvmlite==0.45.* numpy==1.26.* scipy==1.11.*)

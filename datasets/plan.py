@@ -18,7 +18,7 @@ from datasets.trajectories.listed import Listed
 from datasets.trajectories.scatter import MAX_TRIES, Scatter
 from datasets.trajectories.view import PosedFrame, hand_held
 from eposit import Pose
-from render.sensor.motion import PoseRate
+from render.motion import PoseRate, image_points, rolling_pose
 from render.sensor.presets import SensorModel
 from render.targets.facing import shows_front
 from render.world import WorldDraw, draw_world
@@ -47,7 +47,7 @@ class Frame:
     pose_id: int  # frames of one pose differ by camera only
     time_s: float
     camera: CameraSpec
-    cam_from_obj: Pose
+    cam_from_obj: Pose  # under a rolling shutter a RollingPose
     rate: PoseRate  # of the pose
     sensor: SensorModel
     render_seed: int  # 32 bits
@@ -75,9 +75,9 @@ def plan(recipe: Recipe) -> tuple[Frame, ...]:
             frame_id = len(frames)
             render_seed = int(rng_for(recipe.seed, Stream.RENDER, frame_id).integers(2**32))
             sensor_seed = int(rng_for(recipe.seed, Stream.SENSOR, frame_id).integers(2**63))
-            pose, sensor = view.cam_from_obj, _sensor(recipe, view, drawn)
+            pose = rolling_pose(view.cam_from_obj, view.rate, recipe.optics.line_time_s, camera.height)
             place = frame_id, pose_id, view.time_s, camera, pose, view.rate
-            frames.append(Frame(*place, sensor, render_seed, sensor_seed, drawn))
+            frames.append(Frame(*place, _sensor(recipe, view, drawn), render_seed, sensor_seed, drawn))
     for frame in frames:
         fault = _fault(frame.camera, frame.cam_from_obj, recipe)
         if fault:
@@ -175,21 +175,21 @@ def _planned(recipe: Recipe, pose: Pose) -> list[CameraSpec]:
 
 def _fault(spec: CameraSpec, pose: Pose, recipe: Recipe) -> str | None:
     """What is wrong with a pose in front of a camera, with the remedy; None if nothing."""
-    camera, points = spec.true_camera(), pose.apply(recipe.target.points)
+    camera = spec.true_camera()
     if not shows_front(recipe.target, pose.inverse().t):
         return "the camera is behind the board or a bent part of it; turn the target's front towards it"
     if recipe.world.surround == "room" and not contains(recipe.world, recipe.target, pose.inverse().t):
         return "the camera is outside the room; increase world.room_mm, or world.floor_mm where it is below the floor"
-    projected = camera.project(points)
-    unseen = int(np.sum(np.isnan(projected).any(axis=1)))
-    if unseen == len(points) or (unseen and not recipe.allow_cropped):
-        remedy = "" if unseen == len(points) else ", or set allow_cropped = true"
+    projected = image_points(camera, pose, recipe.target.points)
+    count, unseen = len(projected), int(np.sum(np.isnan(projected).any(axis=1)))
+    if unseen == count or (unseen and not recipe.allow_cropped):
+        remedy = "" if unseen == count else ", or set allow_cropped = true"
         return (
-            f"{unseen} of {len(points)} target points are behind the camera or beyond the lens; "
+            f"{unseen} of {count} target points are behind the camera or beyond the lens; "
             f"move the target in front of it{remedy}"
         )
     outside = int(np.sum(~camera.contains(projected)))
-    if outside == len(points) or (outside and not recipe.allow_cropped):
-        remedy = "move the target" if outside == len(points) else "move the target, or set allow_cropped = true"
-        return f"{outside} of {len(points)} target points lie outside the image; {remedy}"
+    if outside == count or (outside and not recipe.allow_cropped):
+        remedy = "move the target" if outside == count else "move the target, or set allow_cropped = true"
+        return f"{outside} of {count} target points lie outside the image; {remedy}"
     return None

@@ -11,7 +11,12 @@ from eposit.calibrated_lens import MOST_COEFFICIENTS
 from render.world import WorldDraw
 
 SCHEMA_VERSION = "3"
+NAN_VERSION = "2"  # had NaN for every null, and `scores` without what `SCORES_ADDED` names
+READABLE = (NAN_VERSION, SCHEMA_VERSION)
+SCORES_ADDED = ("failure_reason", "distance_mm", "field_deg", "tilt_deg")
 MEANING = b"meaning"
+
+FRAME_ID = "frame_id"  # in every table
 
 _STATUS = "ok, or the reason of failure; a failed row keeps its place with nulls"
 
@@ -37,6 +42,15 @@ def _world_fields() -> list[pa.Field]:
 
 
 WORLD_PREFIX = "world_"  # before the name of what is drawn of a world; null in recipes without [world]
+# How the pose moves under a rolling shutter; null under a global one.
+MOTION_COLUMNS = {
+    "line_time_us": "time from one row's exposure to the next one's; the pose is that of row (height_px - 1) / 2",
+    **{
+        f"v_{axis}_mm_per_s": f"{axis} of the velocity of the object frame's origin in the camera frame"
+        for axis in "xyz"
+    },
+    **{f"w_{axis}_rad_per_s": f"{axis} of the rotation vector per second, in the camera frame" for axis in "xyz"},
+}
 _POSE = _floats(
     {f"q_{axis}": f"{axis} of the unit quaternion of cam_from_obj, w >= 0" for axis in "wxyz"}
     | {f"t_{axis}_mm": f"{axis} of the object frame's origin in the camera frame" for axis in "xyz"}
@@ -88,6 +102,7 @@ FRAMES = pa.schema(
         _field("master", pa.string(), "path of the linear-light EXR within the dataset, where these are kept"),
         _field("truth", pa.string(), "path of the EXR with truth for every pixel within the dataset; null: none asked"),
         *_world_fields(),
+        *_floats(MOTION_COLUMNS),
     ]
 )  # fmt: skip
 
@@ -123,7 +138,7 @@ KEYPOINTS = pa.schema(
 
 # Columns that older datasets do not have. Where one holds nothing it takes no part in a table's hash, so that a dataset
 # without a world has the hash it always had.
-LATER_COLUMNS = frozenset({"truth", "visible", *(field.name for field in _world_fields())})
+LATER_COLUMNS = frozenset({"truth", "visible", *MOTION_COLUMNS, *(field.name for field in _world_fields())})
 
 DETECTIONS = pa.schema(
     [

@@ -16,6 +16,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 MINIMUM_LLVM = 19
 CPU_VARIANT = "llvm_ad_rgb"
 CUDA_VARIANT = "cuda_ad_rgb"
@@ -24,6 +27,7 @@ SYSTEM_FOLDERS = (  # below /, with wildcards
     "usr/lib", "usr/local/lib", "opt/homebrew/opt/llvm/lib", "usr/lib/*-linux-gnu*", "usr/lib/llvm-*/lib",
 )  # fmt: skip
 LIBRARY_VARIABLE = "DRJIT_LIBLLVM_PATH"
+ALIGNMENT = 64  # bytes, of the device's memory
 ADVICE = (
     f"install one with `pip install karellen-llvm-core`, or set {LIBRARY_VARIABLE} to libLLVM {MINIMUM_LLVM} or later"
 )
@@ -113,6 +117,25 @@ def jit() -> Any:  # Any: its stubs give `object` for much that our arrays pass 
     import drjit
 
     return drjit
+
+
+def upload(values: NDArray[Any]) -> Any:
+    """(n,) numbers as an array of float32 on the device.
+
+    Dr.Jit reads NumPy's memory in place, and compiles one kernel for memory that is aligned and another one for memory
+    that is not, which is chance. So the numbers are copied to where they are aligned.
+    """
+    memory = np.empty(4 * len(values) + ALIGNMENT, np.uint8)
+    first = -memory.ctypes.data % ALIGNMENT
+    aligned = memory[first : first + 4 * len(values)].view(np.float32)
+    aligned[:] = values
+    return load().Float(aligned)
+
+
+def opaque(*values: float) -> list[Any]:
+    """Numbers that kernels read instead of holding them, so that one kernel serves all values."""
+    mi, dr = load(), jit()
+    return [dr.opaque(mi.Float, float(value)) for value in values]
 
 
 def _problem_of(library: Path) -> str | None:

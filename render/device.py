@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     DeviceIndex: TypeAlias = drjit.auto.ad.UInt
     DeviceBool: TypeAlias = drjit.auto.ad.Bool
     DevicePoint2: TypeAlias = mitsuba.Point2f
+    DevicePoint3: TypeAlias = mitsuba.Point3f
+    DeviceMatrix3: TypeAlias = mitsuba.Matrix3f
     DeviceVector3: TypeAlias = mitsuba.Vector3f
     DeviceRay: TypeAlias = mitsuba.Ray3f
     DeviceRayDifferential: TypeAlias = mitsuba.RayDifferential3f
@@ -25,5 +27,5 @@ if TYPE_CHECKING:
     DeviceScene: TypeAlias = mitsuba.Scene
 else:
     # Any: Dr.Jit resolves the annotations of dataclasses that Mitsuba hands to it, so every name needs a value.
-    DeviceFloat = DeviceInt = DeviceIndex = DeviceBool = DevicePoint2 = DeviceVector3 = Any
-    DeviceRay = DeviceRayDifferential = DeviceSpectrum = DeviceBox = DeviceScene = Any
+    DeviceFloat = DeviceInt = DeviceIndex = DeviceBool = DevicePoint2 = DevicePoint3 = DeviceVector3 = Any
+    DeviceMatrix3 = DeviceRay = DeviceRayDifferential = DeviceSpectrum = DeviceBox = DeviceScene = Any

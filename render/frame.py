@@ -130,7 +130,7 @@ class FrameTruth:
 
     def pixels(self) -> PixelTruth:
         """Depth, range, normal and object of every pixel."""
-        place = self.composition.world_from_obj, tuple(self.composition.objects), self.camera, self.cam_from_obj
+        place = self.composition.world_from_obj, self.composition.names, self.camera, self.cam_from_obj
         return pixel_truth(self.scene, *place)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eposit import Camera, Pose
+from render.motion import image_points
 from render.targets import Target
 from render.targets.image_region import Region
 
@@ -19,7 +20,7 @@ def target_region(target: Target, camera: Camera, cam_from_obj: Pose, margin: in
     Raises:
         ValueError: the target has no image, or none inside the picture.
     """
-    outline = camera.project(cam_from_obj.apply(target.outline()))
+    outline = image_points(camera, cam_from_obj, target.outline())
     if np.any(np.isnan(outline)):
         return Region.whole(camera.width, camera.height)  # part of the board is beyond the lens: it may reach anywhere
     low = np.floor(outline.min(axis=0)).astype(int) - margin

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import pytest
 
 from datasets.store.dataset import open_dataset
-from datasets.store.verify import verify
+from datasets.verify import verify
 from pipelines.cli import main
 
 pytest.register_assert_rewrite("tests.wrong_input")
@@ -91,6 +91,7 @@ def root(tiny, tmp_path):
         for path in (root / table).iterdir():
             if not path.name.startswith("best-detected-exact-all"):
                 path.unlink()
+    open_dataset(root).write_manifest()
     return root
 
 

@@ -27,6 +27,7 @@ from datasets.recipe.written_out import written_out
 from datasets.trajectories import TRAJECTORIES, Trajectory
 from datasets.trajectories.helix import Helix
 from render.light import Light
+from render.optics import Optics
 from render.sensor.presets import DEFAULT_REGIME, SensorModel, regimes
 from render.targets.chessboard import CIRCLE, Chessboard
 from render.targets.kinds import PATTERNS, AnyTarget
@@ -70,6 +71,7 @@ class Recipe(BaseModel):
     light: Annotated[Light, Field(description="lamp, surrounding, background")] = Light()
     sensor: Annotated[SensorModel, Field(description="linear light to 8 bits")] = SensorModel()
     world: Annotated[World, Field(description="what surrounds the target, and how its light is computed")] = World()
+    optics: Annotated[Optics, Field(description="lens and shutter: what decides the rays of a picture")] = Optics()
     outputs: Annotated[Outputs, Field(description="what the dataset holds beside grey pictures")] = Outputs()
     trajectory: Annotated[Trajectory, Field(discriminator="kind", description="the target's path")] = Helix()
     cameras: Annotated[
@@ -145,7 +147,7 @@ class Recipe(BaseModel):
         content = self.model_dump(mode="json", exclude={"name", "description", "quality"})
         content["sensor"] = sensor_values(self.sensor)
         content |= {"samples": self.sample_count(), "target": target_values(self.target)}
-        for name, default in (("world", World()), ("outputs", Outputs())):
+        for name, default in (("world", World()), ("outputs", Outputs()), ("optics", Optics())):
             if getattr(self, name) == default:
                 del content[name]
         if "world" in content and self.world.file_sha256:

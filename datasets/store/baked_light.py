@@ -16,8 +16,7 @@ import numpy as np
 
 from datasets.plan import Frame
 from datasets.recipe.model import Recipe
-from datasets.store.atomic import replace_atomically
-from datasets.store.linear_images import silent_library
+from datasets.store.exr_file import read_exr, read_header, write_exr
 from render.hybrid.bake import BakedLight
 from render.hybrid.prepare import baked_light
 from render.world import WorldDraw
@@ -73,35 +72,21 @@ def light_key(recipe: Recipe, draw: WorldDraw) -> str:
 
 
 def _write(light: BakedLight, path: Path, key: str) -> None:
-    import OpenEXR
-
-    header = {
-        "compression": OpenEXR.ZIP_COMPRESSION,
-        "type": OpenEXR.scanlineimage,
-        "key": key,
-        "circle": json.dumps([float(value) for value in light.disc]),
-    }
-    with (
-        replace_atomically(path) as temporary,
-        OpenEXR.File(header, {"RGB": light.board, "edges": light.edges}) as file,
-    ):
-        file.write(str(temporary))
+    header = {"key": key, "circle": json.dumps([float(value) for value in light.disc])}
+    write_exr(path, header, {"RGB": light.board, "edges": light.edges})
 
 
 def _read(path: Path, key: str) -> BakedLight | None:
     """The light in a file, None where there is none, or none of this key."""
-    import OpenEXR
-
     if not path.is_file():
         return None
     try:
-        with silent_library(), OpenEXR.File(str(path)) as file:
-            header, channels = file.header(), file.channels()
-            if header["key"] != key:
-                return None
-            board, edges = (np.array(channels[name].pixels, np.float32) for name in ("RGB", "edges"))
-            return BakedLight(board, edges, np.array(json.loads(header["circle"]), np.float32))
-    except (ValueError, RuntimeError, KeyError, OSError):
+        if read_header(path).get("key") != key:
+            return None
+        header, channels = read_exr(path)
+        board, edges = (np.asarray(channels[name], np.float32) for name in ("RGB", "edges"))
+        return BakedLight(board, edges, np.array(json.loads(header["circle"]), np.float32))
+    except (ValueError, LookupError, TypeError, OSError):
         return None  # damaged: it is baked again
 
 

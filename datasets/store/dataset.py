@@ -1,7 +1,10 @@
 """A dataset on disk: atomic Parquet shards, bound to one recipe, resumable, verifiable.
 
-A shard is written to a temporary name, flushed, checked and renamed; it is valid if it can be read and its footer
-carries the recipe's hash and a version of the schema that can be read. Resuming is doing what is not there.
+A shard is written to a temporary name, flushed, checked and renamed; it is done if its footer can be read and carries
+the recipe's hash and a version of the schema that can be read. Resuming is doing what is not there.
+
+Read means checked: what is read of a shard is compared with the digests in its footer, with its place, and with the
+frames that the plan has for it.
 """
 
 from __future__ import annotations
@@ -14,19 +17,32 @@ import pyarrow.parquet as pq
 
 from datasets.errors import UserError
 from datasets.recipe.model import Recipe, load_recipe
-from datasets.schema import SCHEMA_VERSION, TABLES
+from datasets.schema import FRAME_ID, READABLE, SCHEMA_VERSION, TABLES
 from datasets.store.atomic import replace_atomically, write_text
 from datasets.store.card import card
 from datasets.store.digest import table_digest
+from datasets.store.keys import fault_of_keys, numbers_of
 from datasets.store.linear_images import are_kept
 from datasets.store.manifest import MANIFEST_FILE, manifest_text, shard_entry
 from datasets.store.nulls import with_nulls
 from datasets.store.provenance import Provenance
-from datasets.store.refusals import SHARD_NAME, damaged, missing, refused, stage_of, unreadable, unsupported
-from datasets.store.shard_file import DIGEST_KEY, RECIPE_KEY, VERSION_KEY, read_rows, write_rows
-from datasets.store.versions import READABLE, as_begun, upgraded, with_later_columns
+from datasets.store.refusals import RECIPE_FILE as RECIPE_FILE
+from datasets.store.refusals import SHARD_NAME, damaged, foreign, missing, refused, stage_of, unreadable, unsupported
+from datasets.store.shard_file import (
+    DIGEST_KEY,
+    PLACE_KEY,
+    RECIPE_KEY,
+    UNREADABLE,
+    VERSION_KEY,
+    DamagedShardError,
+    UnknownVersionError,
+    place_of,
+    read_rows,
+    version_of,
+    write_rows,
+)  # fmt: skip
+from datasets.store.versions import as_begun, upgraded, with_later_columns
 
-RECIPE_FILE = "recipe.toml"
 CARD_FILE = "README.md"
 
 
@@ -37,6 +53,7 @@ class Dataset:
     root: Path
     recipe: Recipe
     provenance: Provenance | None = None  # of what is written through this object; None: the manifest does not tell it
+    check: bool = True  # whether what is read is checked; only who has checked it before may leave that out
 
     def shard_path(self, table: str, index: int, count: int, variant: str = "") -> Path:
         """Path of a shard; `variant` tells kinds of estimates apart."""
@@ -44,15 +61,15 @@ class Dataset:
 
     def index_of(self, path: Path) -> int:
         """The number of a shard."""
-        return int(path.stem.rsplit("-", 3)[1])
+        return numbers_of(path)[0]
 
     def sibling(self, path: Path, table: str, variant: str = "") -> Path:
         """The shard of another table over the same frames."""
-        count = int(path.stem.rsplit("-", 1)[1])
+        count = numbers_of(path)[1]
         return self.shard_path(table, self.index_of(path), count, variant)
 
     def is_done(self, path: Path) -> bool:
-        """Whether a valid shard of this recipe is there.
+        """Whether a shard of this recipe is there; its rows are checked by who reads them.
 
         Raises:
             UserError: it may not be read, or its version cannot be.
@@ -60,11 +77,14 @@ class Dataset:
         if not path.is_file():
             return False
         try:
-            return self._is_of_recipe(path, pq.read_metadata(path).metadata or {})
+            footer = pq.read_metadata(path).metadata or {}
         except PermissionError:
             raise unreadable(path) from None
-        except (pa.ArrowInvalid, OSError):
+        except UNREADABLE:
             return False
+        if VERSION_KEY in footer and version_of(footer) not in READABLE:
+            raise unsupported(path, version_of(footer), READABLE)
+        return footer.get(RECIPE_KEY) == self.recipe.digest().encode()
 
     def write_shard(self, path: Path, rows: pa.Table) -> None:
         """Write one shard atomically.
@@ -73,10 +93,15 @@ class Dataset:
             UserError: the disk or its permissions refuse.
         """
         table = with_nulls(rows.cast(TABLES[path.parent.name]))
-        footer = {RECIPE_KEY: self.recipe.digest(), VERSION_KEY: SCHEMA_VERSION, DIGEST_KEY: table_digest(table)}
+        footer = {
+            RECIPE_KEY.decode(): self.recipe.digest(),
+            VERSION_KEY.decode(): SCHEMA_VERSION,
+            DIGEST_KEY.decode(): table_digest(table),
+            PLACE_KEY.decode(): place_of(path),
+        }
         try:
             with replace_atomically(path) as temporary:
-                write_rows(temporary, path.parent.name, table, {key.decode(): value for key, value in footer.items()})
+                write_rows(temporary, path.parent.name, table, footer)
                 pq.read_metadata(temporary)
         except OSError as error:
             raise refused(path, error) from error
@@ -96,12 +121,17 @@ class Dataset:
         """The rows of one shard, or some columns of them; those of an earlier version of the schema in today's form.
 
         Raises:
-            UserError: missing, unreadable, truncated, of another recipe or of a version that cannot be read.
+            UserError: missing, damaged, of another recipe or place, of a version that cannot be read, or not of the
+                frames that the plan has for it.
         """
-        rows = self.stored_rows(path, columns)
         name = path.parent.name
         wanted = columns or TABLES[name].names
-        if _version(rows.schema.metadata) != SCHEMA_VERSION:
+        rows = self.stored_rows(path, list(dict.fromkeys([FRAME_ID, *wanted])))
+        if self.check:
+            fault = fault_of_keys(self.recipe, path, rows)
+            if fault:
+                raise damaged(path, fault)
+        if version_of(rows.schema.metadata) != SCHEMA_VERSION:
             rows = upgraded(rows, name)
         return with_later_columns(rows, name).select(wanted)
 
@@ -109,29 +139,26 @@ class Dataset:
         """The rows of one shard as they lie in its file, or those of some columns that are there.
 
         Raises:
-            UserError: as `read_shard`.
+            UserError: as `read_shard`, but for the plan's frames.
         """
         try:
-            table = read_rows(path, columns)
+            rows = read_rows(path, columns, check=self.check)
         except FileNotFoundError:
             raise missing(path) from None
         except PermissionError:
             raise unreadable(path) from None
-        except (pa.ArrowInvalid, OSError):
+        except UnknownVersionError as error:
+            raise unsupported(path, str(error), READABLE) from None
+        except DamagedShardError as error:
+            raise damaged(path, str(error)) from None
+        except UNREADABLE:
             raise damaged(path) from None
-        if not self._is_of_recipe(path, table.schema.metadata or {}):
-            raise UserError(f"{path} belongs to another recipe; delete it and run the {stage_of(path)} stage again")
-        return table
-
-    def _is_of_recipe(self, path: Path, metadata: dict[bytes, bytes]) -> bool:
-        """Whether a footer carries the recipe's hash.
-
-        Raises:
-            UserError: its version cannot be read. Nothing is written in the place of such a shard either.
-        """
-        if VERSION_KEY in metadata and _version(metadata) not in READABLE:
-            raise unsupported(path, _version(metadata), READABLE)
-        return metadata.get(RECIPE_KEY, b"").decode() == self.recipe.digest()
+        footer = rows.schema.metadata or {}
+        if footer.get(RECIPE_KEY) != self.recipe.digest().encode():
+            raise foreign(path)
+        if PLACE_KEY in footer and footer[PLACE_KEY] != place_of(path).encode():
+            raise foreign(path, f"at {footer[PLACE_KEY].decode('utf-8', 'replace')}")
+        return rows
 
     def shards(self, table: str) -> list[Path]:
         """Finished shards of a table, in order."""
@@ -161,19 +188,15 @@ class Dataset:
             UserError: a shard is damaged, or the disk or its permissions refuse.
         """
         entries = [shard_entry(self.root, path) for table in TABLES for path in self.shards(table)]
-        text = manifest_text(self.root, self.recipe.digest(), entries, self.provenance)
+        text = manifest_text(self.root, self.recipe, entries, self.provenance)
         write_text(self.root / MANIFEST_FILE, text)
         frames = sum(entry["rows"] for entry in entries if entry["path"].startswith("frames/"))
         tables = [table for table in TABLES if self.shards(table)]
         write_text(self.root / CARD_FILE, card(self.recipe, frames, tables, with_masters=are_kept(self.root)))
 
 
-def _version(metadata: dict[bytes, bytes] | None) -> str:
-    return (metadata or {}).get(VERSION_KEY, b"").decode()
-
-
-def open_dataset(root: Path, provenance: Provenance | None = None) -> Dataset:
-    """The dataset in a folder. provenance: of what will be written.
+def open_dataset(root: Path, provenance: Provenance | None = None, *, check: bool = True) -> Dataset:
+    """The dataset in a folder. provenance: of what will be written. check: whether what is read is checked.
 
     Raises:
         UserError: no dataset there.
@@ -181,4 +204,4 @@ def open_dataset(root: Path, provenance: Provenance | None = None) -> Dataset:
     path = root / RECIPE_FILE
     if not path.is_file():
         raise UserError(f"{root} holds no dataset ({RECIPE_FILE} is missing); run `generate RECIPE --out {root}` first")
-    return Dataset(root, as_begun(load_recipe(str(path))[0], root), provenance)
+    return Dataset(root, as_begun(load_recipe(str(path))[0], root), provenance, check)

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-import io
 import json
-import os
 from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stdout
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
@@ -18,9 +15,12 @@ from datasets.errors import UserError
 from datasets.plan import Frame, plan
 from datasets.recipe.model import Recipe
 from datasets.recipe.targets import target_values
-from datasets.store.atomic import replace_atomically, write_text
+from datasets.store.atomic import write_text
+from datasets.store.exr_file import DamagedExrError, read_exr, read_header, write_exr
 from eposit import Camera
 from render.frame import LinearImage
+from render.motion import RollingPose
+from render.optics import Optics
 from render.targets.image_region import Region
 
 MASTERS = "masters"  # their folder
@@ -35,6 +35,10 @@ class LinearImageError(ValueError):
     """A linear image that cannot be read; the message names the file and the remedy."""
 
 
+class ForeignImageError(LinearImageError):
+    """A linear image of another frame or recipe."""
+
+
 def write_linear(linear: LinearImage, camera: Camera, path: Path, key: str = "") -> None:
     """EXR with the region as data window inside the picture as display window; atomic, lossless.
 
@@ -46,54 +50,40 @@ def write_linear(linear: LinearImage, camera: Camera, path: Path, key: str = "")
     ZIP, of what every reader of EXR knows: 55 % of the size at 5 ms of a fish-eye region of 359 x 333 px; none 1.7 ms;
     ZIPS 63 % at 9 ms; PIZ 59 % at 14 ms. HTJ2K has 33 % at 3 ms, but only OpenEXR 3.4 and later read it.
     """
-    import OpenEXR
-
     rest = linear.background
     if isinstance(rest, np.ndarray):
         stored, window, kept = rest, _whole(camera), {"region": _corners(linear.region)}
     else:
         stored, window, kept = linear.radiance, linear.region, {"background": float(rest)}
-    header = {
-        "compression": OpenEXR.ZIP_COMPRESSION,
-        "type": OpenEXR.scanlineimage,
-        "dataWindow": _corners(window),
-        "displayWindow": _corners(_whole(camera)),
-        "key": key,
-        **kept,
-    }
-    channels = {"RGB": stored} if linear.in_colour else {"Y": stored}
-    with replace_atomically(path) as temporary, OpenEXR.File(header, channels) as file:
-        file.write(str(temporary))
+    header = {"dataWindow": _corners(window), "displayWindow": _corners(_whole(camera)), "key": key, **kept}
+    write_exr(path, header, {"RGB": stored} if linear.in_colour else {"Y": stored})
 
 
-def read_linear(path: Path, key: str = "") -> LinearImage:
-    """The linear image in an EXR file.
+def read_linear(path: Path, key: str = "", *, check: bool = True) -> LinearImage:
+    """The linear image in an EXR file. check: whether its values are compared with its digest, if it has one.
 
     Raises:
-        LinearImageError: the file is missing, truncated, not one of ours, or made from something else than `key`.
+        LinearImageError: the file is missing, damaged, not one of ours, or made from something else than `key`.
     """
-    import OpenEXR
-
     if not path.is_file():
         raise LinearImageError(f"{path} is missing; run the generate stage again to render it")
     try:
-        with silent_library(), OpenEXR.File(str(path)) as file:
-            header, channels = file.header(), file.channels()
-            if header["key"] != key:
-                raise LinearImageError(
-                    f"{path} belongs to another frame or recipe; delete it and run the generate stage again"
-                )
-            stored = np.array(channels["Y" if "Y" in channels else "RGB"].pixels, np.float32)
-            if "background" in header:
-                return LinearImage(stored, _region(header["dataWindow"]), float(header["background"]))
-            region = _region(header["region"])
-            return LinearImage(stored[region.pixels], region, stored)
+        if read_header(path).get("key") != key:
+            raise ForeignImageError(
+                f"{path} belongs to another frame or recipe; `repair {path.parent.parent}` puts it aside and renders "
+                "the right one"
+            )
+        header, channels = read_exr(path, check=check)
+        stored = np.asarray(channels["Y" if "Y" in channels else "RGB"], np.float32)
+        if "background" in header:
+            return LinearImage(stored, _region(header["dataWindow"]), float(header["background"]))
+        region = _region(header["region"])
+        return LinearImage(stored[region.pixels], region, stored)
     except LinearImageError:
         raise
-    except (ValueError, RuntimeError, KeyError, OSError) as error:
-        raise LinearImageError(
-            f"{path} cannot be read as a linear image; delete it and run the generate stage again"
-        ) from error
+    except (ValueError, LookupError, TypeError, OSError) as error:
+        what = str(error) if isinstance(error, DamagedExrError) else "it cannot be read"
+        raise LinearImageError(f"{path} is damaged: {what}; `repair {path.parent.parent}` renders it again") from error
 
 
 def _whole(camera: Camera) -> Region:
@@ -109,20 +99,6 @@ def _corners(region: Region) -> tuple[np.ndarray, np.ndarray]:
 def _region(window: tuple[np.ndarray, np.ndarray]) -> Region:
     low, high = window
     return Region.between((int(low[0]), int(low[1])), (int(high[0]) + 1, int(high[1]) + 1))
-
-
-@contextmanager
-def silent_library() -> Iterator[None]:
-    """Nothing is printed: OpenEXR's library writes what it raises to descriptor 2, its Python binding to sys.stdout."""
-    kept = os.dup(2)
-    try:
-        with open(os.devnull, "wb") as nowhere:
-            os.dup2(nowhere.fileno(), 2)
-        with redirect_stdout(io.StringIO()):
-            yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)
 
 
 def are_kept(root: Path) -> bool:
@@ -181,6 +157,11 @@ def linear_key(recipe: Recipe, frame: Frame) -> str:
     }
     if recipe.outputs.colour:
         parts["colour"] = True
+    if recipe.optics != Optics():
+        parts["optics"] = asdict(recipe.optics)
+    if isinstance(frame.cam_from_obj, RollingPose):
+        rate = frame.cam_from_obj.rate
+        parts["rate"] = [*rate.velocity_mm_per_s.tolist(), *rate.turn_rad_per_s.tolist()]
     if recipe.world.method != "closed":
         world, draw = asdict(recipe.world), asdict(frame.world)
         for left_out in ("exposure_range", "file"):

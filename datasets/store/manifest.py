@@ -12,13 +12,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import pyarrow as pa
 import pyarrow.parquet as pq
 
+from datasets.recipe.model import Recipe
+from datasets.schema import TABLES
 from datasets.store.digest import combined_digest
 from datasets.store.provenance import Provenance
-from datasets.store.refusals import damaged, unreadable
-from datasets.store.shard_file import DIGEST_KEY, VERSION_KEY
+from datasets.store.refusals import RECIPE_FILE, SHARD_NAME, damaged, unreadable
+from datasets.store.shard_file import DIGEST_KEY, UNREADABLE, VERSION_KEY
 
 MANIFEST_FILE = "manifest.json"
 Entry = dict[str, Any]
@@ -34,10 +35,10 @@ def shard_entry(root: Path, path: Path) -> Entry:
         footer = pq.read_metadata(path)
     except PermissionError:
         raise unreadable(path) from None
-    except (pa.ArrowInvalid, OSError):
+    except UNREADABLE:
         raise damaged(path) from None
     found = footer.metadata or {}
-    version, content = (found.get(key, b"").decode() for key in (VERSION_KEY, DIGEST_KEY))
+    version, content = (found.get(key, b"").decode("utf-8", "replace") for key in (VERSION_KEY, DIGEST_KEY))
     place = path.relative_to(root).as_posix()
     return {"path": place, "rows": footer.num_rows, "schema_version": version, "content": content}
 
@@ -53,30 +54,41 @@ def frames_content_of(entries: Sequence[Entry]) -> str:
     return combined_digest("", ((entry["path"], entry["content"]) for entry in frames))
 
 
-def manifest_text(root: Path, recipe: str, entries: Sequence[Entry], provenance: Provenance | None) -> str:
-    """The manifest of a dataset's folder as JSON. recipe: the recipe's hash. provenance: None leaves it as it is."""
+def manifest_text(root: Path, recipe: Recipe, entries: Sequence[Entry], provenance: Provenance | None) -> str:
+    """The manifest of a dataset's folder as JSON. provenance: None leaves it as it is.
+
+    It keeps the text of recipe.toml, which nothing else could restore.
+    """
+    digest = recipe.digest()
     manifest = {
-        "recipe": recipe,
-        "content": content_of(recipe, entries),
+        "recipe": digest,
+        "content": content_of(digest, entries),
         "frames_content": frames_content_of(entries),
-        "made_with": _made_with(_existing(root), entries, provenance),
+        "made_with": _made_with(read_manifest(root) or {}, entries, provenance),
+        "recipe_text": (root / RECIPE_FILE).read_text(encoding="utf-8-sig"),
         "shards": entries,
     }
     return json.dumps(manifest, indent=1) + "\n"
 
 
-def _existing(root: Path) -> Entry:
-    """Provenance and contents of the manifest that is there; empty if there is none that can be read."""
+def read_manifest(root: Path) -> Entry | None:
+    """The manifest of a dataset's folder if it is whole: its hash is that of its entries, which are shards here."""
     try:
         found = json.loads((root / MANIFEST_FILE).read_text(encoding="utf-8"))
-        return {"made_with": list(found.get("made_with", [])), "shards": _contents(found["shards"])}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        return {"made_with": [], "shards": []}
+        is_whole = found["content"] == content_of(found["recipe"], found["shards"])
+        return found if is_whole and all(_is_place(entry["path"]) for entry in found["shards"]) else None
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return None
+
+
+def _is_place(place: str) -> bool:
+    table, _, name = place.partition("/")
+    return table in TABLES and SHARD_NAME.fullmatch(name) is not None
 
 
 def _made_with(existing: Entry, entries: Sequence[Entry], provenance: Provenance | None) -> list[Entry]:
-    known = existing["made_with"]
-    if provenance is None or existing["shards"] == _contents(entries):
+    known = list(existing.get("made_with", []))
+    if provenance is None or (existing and _contents(existing["shards"]) == _contents(entries)):
         return known
     own = provenance.entry()
     return known if any(entry | {"date": own["date"]} == own for entry in known) else [*known, own]

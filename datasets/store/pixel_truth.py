@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from datasets.plan import Frame
 from datasets.recipe.outputs import Layer
-from datasets.store.atomic import replace_atomically
+from datasets.store.exr_file import write_exr
 from render.truth.pixels import PixelTruth
 
 TRUTH = "truth"  # the folder
@@ -25,18 +25,10 @@ def truth_path(frame: Frame) -> str:
 
 def write_truth(truth: PixelTruth, layers: Iterable[Layer], path: Path) -> None:
     """Write some layers: `depth.Z` and `range.Z`, mm; `normal.X` to `normal.Z`; `object_id`, 32 bits; atomic."""
-    import OpenEXR
-
     channels: dict[str, NDArray[np.float32] | NDArray[np.uint32]] = {}
     for layer in layers:
         channels |= _channels(truth, layer)
-    header = {
-        "compression": OpenEXR.ZIP_COMPRESSION,
-        "type": OpenEXR.scanlineimage,
-        OBJECTS_KEY: json.dumps(truth.names),
-    }
-    with replace_atomically(path) as temporary, OpenEXR.File(header, channels) as file:
-        file.write(str(temporary))
+    write_exr(path, {OBJECTS_KEY: json.dumps(truth.names)}, channels)
 
 
 def _channels(truth: PixelTruth, layer: Layer) -> dict[str, NDArray[np.float32] | NDArray[np.uint32]]:

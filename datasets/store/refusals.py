@@ -9,7 +9,12 @@ from pathlib import Path
 
 from datasets.errors import UserError
 
+RECIPE_FILE = "recipe.toml"
 SHARD_NAME = re.compile(r"([^.].*)-\d{5,}-of-(\d{5,})\.parquet")  # temporary and foreign files have other names
+
+
+class ForeignShardError(UserError):
+    """A sound shard that does not belong where it lies."""
 
 
 def missing(path: Path) -> UserError:
@@ -17,9 +22,16 @@ def missing(path: Path) -> UserError:
     return UserError(f"{path} is missing; run the {stage_of(path)} stage first")
 
 
-def damaged(path: Path) -> UserError:
-    """A shard that cannot be decoded."""
-    return UserError(f"{path} is damaged; delete it and run the {stage_of(path)} stage again")
+def damaged(path: Path, what: str = "it cannot be read") -> UserError:
+    """A shard that does not hold what was written to it. what: how that shows."""
+    return UserError(f"{path} is damaged: {what}; `repair {path.parent.parent}` makes it again")
+
+
+def foreign(path: Path, what: str = "to another recipe") -> ForeignShardError:
+    """A sound shard that does not belong where it lies. what: where it belongs."""
+    return ForeignShardError(
+        f"{path} belongs {what}; `repair {path.parent.parent}` puts it aside and makes the right one"
+    )
 
 
 def unreadable(path: Path) -> UserError:

@@ -3,6 +3,9 @@
 A footer stands in every shard, so it is kept small: Arrow's own copy of the schema, which repeats every key in base64,
 is left out; Parquet's types say the same but for the length of a list, which the schema here knows. Meanings are one
 JSON text for the file. Statistics are kept for the columns by which readers choose shards.
+
+The footer has a digest of each column, so that who reads some columns checks these and no others, and one of its own
+keys and values. Parquet's checksums of pages are written, too: a damaged page is refused before it is unpacked.
 """
 
 from __future__ import annotations
@@ -14,16 +17,30 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from datasets.schema import KEYS, TABLES, meanings
+from datasets.schema import KEYS, LATER_COLUMNS, NAN_VERSION, READABLE, SCORES_ADDED, TABLES, meanings
+from datasets.store.digest import column_digest, text_digest
 from datasets.store.nulls import is_list_of_floats
 
 RECIPE_KEY, VERSION_KEY, DIGEST_KEY = b"recipe", b"schema_version", b"content"
+PLACE_KEY = b"place"  # table and name of the file, so that a shard under another's name is known
+CHECKS_KEY = b"checks"  # a digest of each column in their order, then one of the other keys and values
 MEANINGS_KEY = "meanings"  # column name to meaning, JSON
 HUGGINGFACE_KEY = "huggingface"  # which columns are images, as Hugging Face's `datasets` reads it
+Footer = dict[bytes, bytes]
+# What Arrow raises of files that are damaged or no Parquet, from where it notices.
+UNREADABLE = (OSError, ValueError, LookupError, ArithmeticError, MemoryError, TypeError, pa.ArrowException)
+
+
+class UnknownVersionError(ValueError):
+    """A shard of a version of the schema that is not known here; the message is the version."""
+
+
+class DamagedShardError(ValueError):
+    """A shard that does not hold what was written; the message says in a few words what is wrong."""
 
 
 def write_rows(path: Path, table: str, rows: pa.Table, footer: dict[str, str]) -> None:
-    """Write rows of a table with keys and values for the footer.
+    """Write rows of a table with keys and values for the footer, and digests of all.
 
     Raises:
         OSError: the system refuses.
@@ -34,22 +51,96 @@ def write_rows(path: Path, table: str, rows: pa.Table, footer: dict[str, str]) -
         "use_dictionary": [field.name for field in schema if pa.types.is_string(field.type)],
         "write_statistics": [name for name in schema.names if name in KEYS],
         "store_schema": False,
+        "write_page_checksum": True,
     }
+    told = footer | _described(schema)
+    digests = [*(column_digest(name, rows.column(name)) for name in rows.column_names), _footer_digest(told)]
     with pq.ParquetWriter(path, schema.remove_metadata(), **options) as writer:
         writer.write_table(rows)
-        writer.add_key_value_metadata(footer | _described(schema))
+        writer.add_key_value_metadata(told | {CHECKS_KEY.decode(): " ".join(digests)})
 
 
-def read_rows(path: Path, columns: list[str] | None = None) -> pa.Table:
-    """All columns, or those of some that are there; lists have their lengths again.
+def read_rows(path: Path, columns: list[str] | None = None, *, check: bool = True) -> pa.Table:
+    """All columns, or those of some that are there; lists have their lengths again. The footer is the table's metadata.
+
+    check: whether what is read is compared with its digests, where the file has any.
 
     Raises:
-        OSError, pa.ArrowInvalid: it cannot be read.
+        UnknownVersionError: its version is not known here.
+        DamagedShardError: it is not what was written.
+        UNREADABLE: it cannot be read.
     """
-    if columns is not None:
-        there = pq.read_schema(path).names
-        columns = [name for name in columns if name in there]
-    rows, schema = pq.read_table(path, columns=columns), TABLES[path.parent.name]
+    schema = TABLES[path.parent.name]
+    with pq.ParquetFile(path, page_checksum_verification=check) as file:
+        names, footer = file.schema_arrow.names, file.metadata.metadata or {}
+        if VERSION_KEY in footer and version_of(footer) not in READABLE:
+            raise UnknownVersionError(version_of(footer))
+        digests = _digests(names, footer) if check else {}
+        _check_names(names, path.parent.name, version_of(footer))
+        rows = file.read(None if columns is None else [name for name in columns if name in names])
+    rows = _with_list_lengths(rows, schema)
+    for field in rows.schema:
+        if field.type != schema.field(field.name).type:
+            raise DamagedShardError(f"its column {field.name} is of type {field.type}")
+        if digests and column_digest(field.name, rows.column(field.name)) != digests[field.name]:
+            raise DamagedShardError(f"the values of {field.name} are not those that were written")
+    return rows.replace_schema_metadata(footer)
+
+
+def version_of(footer: Footer) -> str:
+    """The version of the schema that a footer states; empty if it states none."""
+    return footer.get(VERSION_KEY, b"").decode("utf-8", "replace")
+
+
+def place_of(path: Path) -> str:
+    """What `PLACE_KEY` says in the file of a shard."""
+    return f"{path.parent.name}/{path.name}"
+
+
+def has_digests(footer: Footer) -> bool:
+    """Whether a shard's values can be checked when they are read: older shards have none."""
+    return CHECKS_KEY in footer
+
+
+def _digests(names: list[str], footer: Footer) -> dict[str, str]:
+    """Column to digest; nothing where the file has none.
+
+    Raises:
+        DamagedShardError: the footer is not what was written.
+    """
+    if not has_digests(footer):
+        return {}
+    *columns, own = footer[CHECKS_KEY].decode("utf-8", "replace").split(" ")
+    told = {_text(key): _text(value) for key, value in footer.items() if key != CHECKS_KEY}
+    if own != _footer_digest(told) or len(columns) != len(names):
+        raise DamagedShardError("its footer is not the one that was written")
+    return dict(zip(names, columns, strict=True))
+
+
+def _check_names(names: list[str], table: str, version: str) -> None:
+    """Refuse columns that are not those of a table: later ones may lack.
+
+    Raises:
+        DamagedShardError: with the first that is wrong.
+    """
+    added = SCORES_ADDED if table == "scores" and version == NAN_VERSION else ()
+    wanted = [name for name in TABLES[table].names if name not in added]
+    unknown = [name for i, name in enumerate(names) if name not in wanted or name in names[:i]]
+    lacking = [name for name in wanted if name not in names and name not in LATER_COLUMNS]
+    if unknown or lacking:
+        what = f"has a column {unknown[0]!r} too many" if unknown else f"lacks the column {lacking[0]!r}"
+        raise DamagedShardError(f"it {what}")
+
+
+def _footer_digest(footer: dict[str, str]) -> str:
+    return text_digest(json.dumps(sorted(footer.items())))
+
+
+def _text(data: bytes) -> str:
+    return data.decode("utf-8", "backslashreplace")
+
+
+def _with_list_lengths(rows: pa.Table, schema: pa.Schema) -> pa.Table:
     for i, field in enumerate(rows.schema):
         if pa.types.is_list(field.type) and field.name in schema.names:
             wanted = schema.field(field.name)

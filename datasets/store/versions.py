@@ -9,13 +9,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from datasets.recipe.model import Recipe
-from datasets.schema import LATER_COLUMNS, SCHEMA_VERSION, TABLES
+from datasets.schema import LATER_COLUMNS, SCORES_ADDED, TABLES
 from datasets.store.nulls import with_nulls
-from datasets.store.shard_file import RECIPE_KEY
+from datasets.store.shard_file import RECIPE_KEY, UNREADABLE, has_digests
 
-NAN_VERSION = "2"  # had NaN for every null, and `scores` without what `SCORES_ADDED` names
-READABLE = (NAN_VERSION, SCHEMA_VERSION)
-SCORES_ADDED = ("failure_reason", "distance_mm", "field_deg", "tilt_deg")
 OLD_SHARD_FRAMES = 10  # of a recipe without `shard_frames`, when the version was 2
 
 
@@ -51,14 +48,26 @@ def as_begun(recipe: Recipe, root: Path) -> Recipe:
     return old if old.digest() in _carried(root) else recipe
 
 
+def without_digests(root: Path) -> bool:
+    """Whether the first shard of a table is of an earlier version of this program, which wrote no digests."""
+    for table in TABLES:
+        for path in sorted((root / table).glob("[!.]*.parquet"))[:1]:
+            try:
+                if not has_digests(pq.read_metadata(path).metadata or {}):
+                    return True
+            except UNREADABLE:
+                continue  # whoever reads the rows says what is wrong with it
+    return False
+
+
 def _carried(root: Path) -> Iterator[str]:
     """Hashes of recipes that a folder's shards carry, one of each table."""
     for table in TABLES:
         for path in sorted((root / table).glob("[!.]*.parquet")):
             try:
-                yield (pq.read_metadata(path).metadata or {}).get(RECIPE_KEY, b"").decode()
+                yield (pq.read_metadata(path).metadata or {}).get(RECIPE_KEY, b"").decode("utf-8", "replace")
                 break
-            except (OSError, pa.ArrowInvalid):
+            except UNREADABLE:
                 continue  # whoever reads the rows says what is wrong with it
 
 

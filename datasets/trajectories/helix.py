@@ -11,7 +11,7 @@ from datasets.trajectories.view import KIND_MEANING, PosedFrame
 from eposit import Pose
 from eposit.arrays import Array
 from eposit.pose import rotation_error_vector, rotation_from_euler
-from render.sensor.motion import PoseRate
+from render.motion import PoseRate
 from render.targets import Target
 
 HALF_STEP_S = 0.005  # of the helix's central difference: rounding and curvature both stay below 1e-9 of the rate

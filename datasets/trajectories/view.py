@@ -8,7 +8,7 @@ import numpy as np
 
 from eposit import Pose
 from eposit.arrays import Array
-from render.sensor.motion import PoseRate
+from render.motion import PoseRate
 from render.targets import Target
 
 MAX_POSES = 1_000_000

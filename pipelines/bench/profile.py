@@ -25,10 +25,13 @@ from pipelines.detection.board_map import grid
 from pipelines.detection.circle import find_circle
 from pipelines.detection.corner_sites import chessboard_sites
 from pipelines.detection.corners import refine_corners
-from pipelines.detection.finders import CLASSIC_FLAGS, SUBPIX_STOP, SUBPIX_WINDOW, find_board, textured_region
+from pipelines.detection.finders import SUBPIX_STOP, SUBPIX_WINDOW, find_board
 from pipelines.detection.first_map import first_map
+from pipelines.detection.statuses import PointStatus
+from pipelines.detection.textured_region import textured_region
 
 PART = "profile"
+CLASSIC_FLAGS = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
 Call = Callable[[], Any]
 
 
@@ -68,12 +71,12 @@ def _steps(recipe: Recipe, frame: Frame, folder: Path) -> Iterator[tuple[str, Ca
 def _detection(image: Any, target: Any) -> Iterator[tuple[str, Call, str, Call]]:
     part = image[textured_region(image).pixels]
     finder = functools.partial(cv2.findChessboardCorners, part, target.inner, flags=CLASSIC_FLAGS)
-    yield "find the board", functools.partial(find_board, image, target), "OpenCV's finder on its region", finder
+    yield "find the board", functools.partial(find_board, image, target), "OpenCV's finder on the textured part", finder
     board, sites = find_board(image, target), chessboard_sites(target)
-    if board is None:
+    if isinstance(board, PointStatus):
         return
-    rough = functools.partial(first_map, board.corners_px, (image.shape[1], image.shape[0]), target)
-    start = board.corners_px.astype(np.float32).reshape(-1, 1, 2)
+    rough = functools.partial(first_map, board, (image.shape[1], image.shape[0]), target)
+    start = board.points_px.astype(np.float32).reshape(-1, 1, 2)
     yield "map from board to image", rough, "its slopes once", functools.partial(rough().slopes, grid(target.inner))
     subpix = lambda: cv2.cornerSubPix(image, start.copy(), SUBPIX_WINDOW, (-1, -1), SUBPIX_STOP)  # noqa: E731
     yield "corners", functools.partial(refine_corners, image, rough(), sites), "cv2.cornerSubPix", subpix

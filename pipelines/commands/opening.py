@@ -82,6 +82,7 @@ def writing(folder: Path, *, shared: bool = False) -> Iterator[Dataset]:
     from pipelines.machine import provenance
 
     dataset = open_dataset(folder, provenance())
+    _tell_unchecked(folder)
     with hold(folder, shared=shared):
         yield dataset
 
@@ -112,4 +113,15 @@ def opened(folder: Path) -> Dataset:
     """
     from datasets.store.dataset import open_dataset
 
-    return open_dataset(folder)
+    dataset = open_dataset(folder)
+    _tell_unchecked(folder)
+    return dataset
+
+
+def _tell_unchecked(folder: Path) -> None:
+    """Say that a dataset has no digests by which what is read could be checked."""
+    from datasets.store.versions import without_digests
+
+    if without_digests(folder):
+        told = f"{folder} was begun by an earlier version, which wrote no digests: what is read of it is not checked"
+        print(f"{told}; `verify {folder}` checks it as a whole", file=sys.stderr)

@@ -11,7 +11,7 @@ import typer
 
 from datasets.errors import UserError
 from pipelines.commands import options as o
-from pipelines.commands.opening import load, opened
+from pipelines.commands.opening import load
 from pipelines.commands.tables import Column, Footnotes, print_footnotes, print_json, print_keys, print_table
 
 if TYPE_CHECKING:
@@ -22,17 +22,18 @@ if TYPE_CHECKING:
 
 
 def verify(folder: o.Folder, json: o.Json = False) -> None:
-    """Check every shard and master, and print the hash of the content."""
-    from datasets.store.verify import verify as check
+    """Check every file that plan and manifest name, a line for each problem; print the hash of the content."""
+    from datasets.store.dataset import open_dataset
+    from datasets.verify import verify as check
 
-    digest, problems = check(opened(folder))
+    digest, problems = check(open_dataset(folder))
     if json:
-        print_json({"content": digest, "problems": problems})
-    if problems:
-        more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
-        raise UserError(f"{problems[0]}{more}")
-    if not json:
+        told = [{"path": str(item.path), "kind": item.kind, "text": item.text} for item in problems]
+        print_json({"content": digest, "problems": told})
+    elif not problems:
         typer.echo(f"content {digest}")
+    if problems:
+        raise UserError("\nerror: ".join(item.text for item in problems))
 
 
 def doctor(json: o.Json = False) -> None:

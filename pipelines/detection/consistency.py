@@ -12,7 +12,7 @@ from pipelines.detection.board_map import BoardMap
 LIMIT_PX = 0.5  # largest distance of a corner from the map through the others
 LIMIT_SHARE = 0.03  # or this share of the local square, whichever is more
 LIMIT_SPREADS, MOST_SHARE = 4.0, 0.15  # or so many median distances, up to this share of the local square
-BAD_SHARE = 0.1  # of the corners that may be inconsistent before the board is
+BAD_SHARE = 0.25  # of the corners that may be inconsistent before the board is, and one of few in any case
 PRIOR_FREEDOM = 10.0  # degrees of freedom with which the pixels' own noise counts against the corners' scatter
 
 
@@ -33,7 +33,7 @@ def drop_inconsistent(corners: Corners, at: Array, size: tuple[int, int], prior:
     good, points = corners.consistent.copy(), corners.points_px
     side = np.sqrt(np.abs(np.linalg.det(corners.board.jacobian(at))))
     board = corners.board
-    for _ in range(int(BAD_SHARE * len(points)) + 1):
+    for _ in range(max(1, int(BAD_SHARE * len(points))) + 1):
         if 2 * np.sum(good) <= board.slopes(at).shape[-1]:
             return replace(corners, consistent=np.zeros(len(at), bool))
         weights = _weights(corners.covariance_px2, good)
@@ -48,6 +48,11 @@ def drop_inconsistent(corners: Corners, at: Array, size: tuple[int, int], prior:
         good[worst] = False
     factor = _scatter(corners, board, at, good, prior)
     return replace(corners, covariance_px2=corners.covariance_px2 * factor, consistent=good, board=board)
+
+
+def too_many_bad(consistent: Mask) -> bool:
+    """Whether so many corners are inconsistent that none is believed."""
+    return int(np.sum(~consistent)) > max(1.0, BAD_SHARE * len(consistent))
 
 
 def check_placed(points_px: Array, fitted: Corners, at: Array, size: tuple[int, int]) -> Corners:

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eposit.arrays import Array
-from pipelines.detection.finders import Grey, textured_region
+from pipelines.detection.grey_picture import Grey
 from pipelines.detection.seen_points import SeenPoints
+from pipelines.detection.textured_region import textured_region
 from render.targets.aprilgrid import BORDER_MODULES, AprilGrid
 from render.targets.charuco import Charuco
 

@@ -1,4 +1,4 @@
-"""Points of a printed board in an image: OpenCV says which is where, our fits place them."""
+"""Points of a printed board in an image: a finder says which is where, our fits place them."""
 
 from __future__ import annotations
 
@@ -12,10 +12,12 @@ from pipelines.detection.circle_grids import find_circle_grid, refine_circles
 from pipelines.detection.consistency import Corners, check_placed
 from pipelines.detection.corner_sites import CornerSites
 from pipelines.detection.corners import refine_corners
-from pipelines.detection.finders import Grey, find_board, subpix
+from pipelines.detection.finders import find_board, subpix
 from pipelines.detection.first_map import FIRM_HOLD, OUTLIER_PX
+from pipelines.detection.grey_picture import Grey
 from pipelines.detection.markers import find_aprilgrid, find_charuco
 from pipelines.detection.seen_points import SeenPoints
+from pipelines.detection.statuses import PointStatus
 from render.targets.aprilgrid import BORDER_MODULES, AprilGrid, tag_bits
 from render.targets.charuco import Charuco
 from render.targets.circle_grid import CircleGrid
@@ -27,9 +29,9 @@ GENTLE_PX = 0.5  # distance at which a seen point's weight in the first map is o
 BORDER_PX = 3.0  # a point nearer to the picture's border than this is not looked for
 
 
-def find_points(image: Grey, target: PrintedBoard) -> SeenPoints | None:
-    """Points of the target as OpenCV sees them; None if it does not see enough."""
-    seen: SeenPoints | None = None
+def find_points(image: Grey, target: PrintedBoard) -> SeenPoints | PointStatus:
+    """Points of the target as a finder sees them, or the status of all if it sees too few, or not which they are."""
+    seen: SeenPoints | PointStatus | None = None
     if isinstance(target, Charuco):
         seen = find_charuco(image, target)
     elif isinstance(target, AprilGrid):
@@ -37,9 +39,10 @@ def find_points(image: Grey, target: PrintedBoard) -> SeenPoints | None:
     elif isinstance(target, CircleGrid):
         seen = find_circle_grid(image, target)
     elif isinstance(target, PlainChessboard):
-        found = find_board(image, target)
-        seen = None if found is None else SeenPoints(np.arange(len(found.corners_px)), found.corners_px, found.finder)
-    return seen if seen is not None and len(seen.ids) >= LEAST_SEEN else None
+        seen = find_board(image, target)
+    if isinstance(seen, PointStatus):
+        return seen
+    return seen if seen is not None and len(seen.ids) >= LEAST_SEEN else PointStatus.BOARD_NOT_FOUND
 
 
 def place_points(image: Grey, seen: SeenPoints, target: PrintedBoard) -> Corners:

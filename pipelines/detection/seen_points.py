@@ -1,4 +1,4 @@
-"""What OpenCV's finders say of a printed board."""
+"""What a finder says of a target."""
 
 from __future__ import annotations
 

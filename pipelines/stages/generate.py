@@ -15,19 +15,21 @@ from datasets.errors import UserError
 from datasets.plan import Frame, frames_of_shard, shard_count
 from datasets.recipe.model import Recipe
 from datasets.rows import pose_columns, table
-from datasets.schema import FRAMES, KEYPOINTS, WORLD_PREFIX
+from datasets.schema import FRAMES, KEYPOINTS, MOTION_COLUMNS, WORLD_PREFIX
 from datasets.store.baked_light import light_of
 from datasets.store.dataset import Dataset
 from datasets.store.images import encode_png
 from datasets.store.linear_images import LinearImageError, are_kept, linear_key, linear_path, read_linear, write_linear
 from datasets.store.pixel_truth import truth_path, write_truth
 from datasets.store.refusals import refused
+from eposit import Pose
 from eposit.arrays import Array, Mask
 from eposit.calibrated_lens import MOST_COEFFICIENTS
 from eposit.pose import tilt_rad
 from pipelines.engines.background import overlapped
 from render.frame import LinearImage, render_world, truth_of
 from render.hybrid.bake import BakedLight
+from render.motion import RollingPose, image_points, points_in_cam
 from render.pathtraced.picture import Viewpoint
 from render.sensor.develop import FrameContext, develop
 from render.targets.image_region import Region
@@ -194,23 +196,32 @@ def _row(recipe: Recipe, frame: Frame, region: Region, image: NDArray[np.uint8])
         "master": linear_path(frame),
         "truth": truth_path(frame) if recipe.outputs.aovs else None,
         **drawn,
+        **_motion_columns(frame.cam_from_obj),
     }
+
+
+def _motion_columns(pose: Pose) -> dict[str, float | None]:
+    """The line time and the pose's rate under a rolling shutter, null under a global one."""
+    if not isinstance(pose, RollingPose):
+        return dict.fromkeys(MOTION_COLUMNS)
+    rate = pose.rate.velocity_mm_per_s, pose.rate.turn_rad_per_s
+    return dict(zip(MOTION_COLUMNS, (1e6 * pose.line_time_s, *np.concatenate(rate).tolist()), strict=True))
 
 
 def true_points(recipe: Recipe, frame: Frame) -> Array:
     """(n, 2) px images of the target's points, NaN beyond the lens."""
-    return frame.camera.true_camera().project(frame.cam_from_obj.apply(recipe.target.points))
+    return image_points(frame.camera.true_camera(), frame.cam_from_obj, recipe.target.points)
 
 
 def _keypoints(recipe: Recipe, frame: Frame, visible: Mask | None) -> pa.Table:
     target, camera = recipe.target, frame.camera.true_camera()
     points, pixels = target.points, true_points(recipe, frame)
-    in_cam = frame.cam_from_obj.apply(points)
+    in_cam = points_in_cam(camera, frame.cam_from_obj, points)
     outline = pixels.copy()
     for point in range(len(points)):
         rim = target.rim(point)
         if rim is not None:
-            outline[point] = outline_centroid(camera.project(frame.cam_from_obj.apply(rim)))
+            outline[point] = outline_centroid(image_points(camera, frame.cam_from_obj, rim))
     return table(
         KEYPOINTS,
         {

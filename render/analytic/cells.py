@@ -36,25 +36,25 @@ def sample_cells(
     """What cells see whose centres are at x_px, y_px and whose sides are `size`, px."""
     rays = camera.rays(x_px, y_px)
     if isinstance(target, DevicePrint):
-        return _sample_print(target, camera, rays, size)
-    return _sample_chessboard(target, camera, rays, size)
+        return _sample_print(target, rays, size)
+    return _sample_chessboard(target, rays, size)
 
 
-def _sample_print(target: DevicePrint, camera: DeviceCamera, rays: RayBundle, size: DeviceFloat) -> CellSample:
+def _sample_print(target: DevicePrint, rays: RayBundle, size: DeviceFloat) -> CellSample:
     """A printed board, which may be bent."""
     mi, dr = backend.load(), backend.jit()
-    hit, front = meet_sheet(camera, rays, target.sheet, size)
+    hit, front = meet_sheet(rays, target.sheet, size)
     board = sample_print(target, hit)
     share = dr.select(hit.met & rays.seen, board.share, 0.0)
     radiance = dr.select(front, share * board.reflectance * shading_at(target, hit.x, hit.y), 0.0)
     return CellSample(radiance, share, mi.UInt32(dr.select(hit.met, board.edges, SMOOTH)))
 
 
-def _sample_chessboard(target: DeviceTarget, camera: DeviceCamera, rays: RayBundle, size: DeviceFloat) -> CellSample:
+def _sample_chessboard(target: DeviceTarget, rays: RayBundle, size: DeviceFloat) -> CellSample:
     """The flat chessboard and its raised circle."""
     mi, dr = backend.load(), backend.jit()
-    disc, rim, within_disc = _sample_disc(target, meet_plane(camera, rays, target.disc.z, size))
-    hit = meet_plane(camera, rays, 0.0, size)
+    disc, rim, within_disc = _sample_disc(target, meet_plane(rays, target.disc.z, size))
+    hit = meet_plane(rays, 0.0, size)
     board = sample_board(target, hit)
     board_edges = dr.select(hit.met, dr.select(_may_be_shadowed(target, hit), MANY_EDGES, board.edges), SMOOTH)
     edges = dr.select(rim, MANY_EDGES, dr.select(within_disc, SMOOTH, board_edges))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from render import backend
-from render.analytic.rays import DeviceCamera, RayBundle
+from render.analytic.rays import RayBundle
 from render.device import DeviceBool, DeviceFloat
 
 FAR = 1e6  # mm; what lies farther, or is not finite, is taken for this
@@ -24,13 +24,13 @@ class PlaneHit:
     met: DeviceBool  # whether the plane lies ahead
 
 
-def meet_plane(camera: DeviceCamera, rays: RayBundle, z: DeviceFloat | float, size: DeviceFloat) -> PlaneHit:
+def meet_plane(rays: RayBundle, z: DeviceFloat | float, size: DeviceFloat) -> PlaneHit:
     """Where rays meet the plane at z, mm. size: side of a cell, px."""
     dr = backend.jit()
-    direction = rays.direction
+    direction, origin = rays.direction, rays.origin
     inverse = 1.0 / direction.z
-    length = (z - camera.origin[2]) * inverse
-    x, y = camera.origin[0] + length * direction.x, camera.origin[1] + length * direction.y
+    length = (z - origin[2]) * inverse
+    x, y = origin[0] + length * direction.x, origin[1] + length * direction.y
     slope_x, slope_y, scale = direction.x * inverse, direction.y * inverse, length * size
     along_x, along_y = rays.along_x, rays.along_y
     return PlaneHit(

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from eposit import Camera, Pose
 from render import backend
 from render.device import DeviceBool, DeviceFloat, DeviceVector3
 from render.lens_law import DeviceLens, device_lens, incidence_angle
+from render.motion import RollingPose
+
+ROW_NUMBERS = 12  # nine of a rotation, three of an origin
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,6 +24,7 @@ class RayBundle:
     along_x: DeviceVector3  # change of the direction for one pixel along x
     along_y: DeviceVector3  # for one pixel along y
     seen: DeviceBool  # whether the point lies inside the lens's image circle
+    origin: Sequence[DeviceFloat]  # camera's centre in the object frame, mm
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +36,7 @@ class DeviceCamera:
     centre: list[DeviceFloat]  # cx, cy, px
     rotation: list[DeviceFloat]  # nine numbers of obj_from_cam, row by row
     origin: list[DeviceFloat]  # camera centre in the object frame, mm
+    rows: DeviceFloat | None = None  # under a rolling shutter both for each row of the picture, one row after another
 
     def rays(self, x_px: DeviceFloat, y_px: DeviceFloat) -> RayBundle:
         """Rays through points of the picture, px, pixel centres at integers.
@@ -50,13 +58,25 @@ class DeviceCamera:
         in_cam = (x * side, y * side, theta.cosine)
         per_pixel_x = ((side + radial * ex * ex) / fx, radial * ex * ey / fx, axial * ex / fx)
         per_pixel_y = (radial * ex * ey / fy, (side + radial * ey * ey) / fy, axial * ey / fy)
-        direction, along_x, along_y = (self._to_object(vector) for vector in (in_cam, per_pixel_x, per_pixel_y))
-        return RayBundle(direction, along_x, along_y, rho <= self.law.rho_max)
+        rotation, origin = self._placement(y_px)
+        direction, along_x, along_y = (_turned(rotation, vector) for vector in (in_cam, per_pixel_x, per_pixel_y))
+        return RayBundle(direction, along_x, along_y, rho <= self.law.rho_max, origin)
 
-    def _to_object(self, v: tuple[DeviceFloat, DeviceFloat, DeviceFloat]) -> DeviceVector3:
-        """A vector turned from camera axes to the object's."""
-        r = self.rotation
-        return backend.load().Vector3f(*(r[i] * v[0] + r[i + 1] * v[1] + r[i + 2] * v[2] for i in (0, 3, 6)))
+    def _placement(self, y_px: DeviceFloat) -> tuple[Sequence[DeviceFloat], Sequence[DeviceFloat]]:
+        """Rotation and origin at the time of the row of pixels in which a place of the picture lies."""
+        if self.rows is None:
+            return self.rotation, self.origin
+        mi, dr = backend.load(), backend.jit()
+        last = dr.width(self.rows) // ROW_NUMBERS - 1
+        first = mi.UInt32(dr.clip(dr.floor(y_px + 0.5), 0.0, dr.opaque(mi.Float, last))) * ROW_NUMBERS
+        numbers = [dr.gather(mi.Float, self.rows, first + i) for i in range(ROW_NUMBERS)]
+        return numbers[:9], numbers[9:]
+
+
+def _turned(rotation: Sequence[DeviceFloat], v: tuple[DeviceFloat, DeviceFloat, DeviceFloat]) -> DeviceVector3:
+    """A vector turned from camera axes to the object's."""
+    r = rotation
+    return backend.load().Vector3f(*(r[i] * v[0] + r[i + 1] * v[1] + r[i + 2] * v[2] for i in (0, 3, 6)))
 
 
 def device_camera(camera: Camera, cam_from_obj: Pose) -> DeviceCamera:
@@ -66,4 +86,13 @@ def device_camera(camera: Camera, cam_from_obj: Pose) -> DeviceCamera:
     numbers = [camera.fx, camera.fy, camera.cx, camera.cy, *obj_from_cam.R.ravel(), *obj_from_cam.t]
     scalars = [dr.opaque(mi.Float, float(value)) for value in numbers]
     law = device_lens(camera.lens, camera.coefficients)
-    return DeviceCamera(law, scalars[:2], scalars[2:4], scalars[4:13], scalars[13:])
+    return DeviceCamera(law, scalars[:2], scalars[2:4], scalars[4:13], scalars[13:], _row_placements(cam_from_obj))
+
+
+def _row_placements(cam_from_obj: Pose) -> DeviceFloat | None:
+    """ROW_NUMBERS numbers for each row of the picture; None where one pose holds for all."""
+    if not isinstance(cam_from_obj, RollingPose):
+        return None
+    obj_from_cam = cam_from_obj.at_rows(np.arange(cam_from_obj.height)).inverse()
+    table = np.concatenate((obj_from_cam.R.reshape(-1, 9), obj_from_cam.t), axis=1)
+    return backend.load().Float(table.astype(np.float32).ravel())

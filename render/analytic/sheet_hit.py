@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from render import backend
 from render.analytic.device_print import DeviceSheet
 from render.analytic.plane_hit import FAR, PlaneHit
-from render.analytic.rays import DeviceCamera, RayBundle
+from render.analytic.rays import RayBundle
 from render.device import DeviceBool, DeviceFloat, DeviceVector3
 
 NEWTON_STEPS = 6
@@ -25,15 +25,13 @@ class _Height:
     rise_y: DeviceFloat
 
 
-def meet_sheet(
-    camera: DeviceCamera, rays: RayBundle, sheet: DeviceSheet, size: DeviceFloat
-) -> tuple[PlaneHit, DeviceBool]:
+def meet_sheet(rays: RayBundle, sheet: DeviceSheet, size: DeviceFloat) -> tuple[PlaneHit, DeviceBool]:
     """Where rays meet the sheet, mm of the print, and whether they meet its front. size: side of a cell, px.
 
     No part of the sheet may hide another.
     """
     dr = backend.jit()
-    direction, (x0, y0, z0) = rays.direction, camera.origin
+    direction, (x0, y0, z0) = rays.direction, rays.origin
     x0, y0 = x0 - sheet.centre[0], y0 - sheet.centre[1]
     length = -z0 / direction.z
     for _ in range(NEWTON_STEPS):

@@ -108,8 +108,9 @@ class Baker:
         mi, dr = backend.load(), backend.jit()
         purpose, first = key
         lane = dr.arange(mi.UInt32, 2 * len(points) * half)
-        place = lane // half  # texel and half
-        ray, texel = lane - place * half, place >> 1
+        rays = dr.opaque(mi.UInt32, half)  # so that one kernel serves all grids
+        place = lane // rays  # texel and half
+        ray, texel = lane - place * rays, place >> 1
         seed = dr.opaque(mi.UInt32, (self.seed + 0x9E3779B9 * (purpose + 1)) & 0xFFFFFFFF)
         pixel = place + dr.opaque(mi.UInt32, 2 * first)
         numbers = lattice_numbers(pixel, ray, seed, NUMBERS + 2)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from eposit import Camera, Pose
 from eposit.arrays import Array
 from render import backend
+from render.motion import RollingPose
 from render.targets.image_region import Region
 
 ANGLES = 512  # cosines at which the layer's transmission is tabulated
@@ -35,7 +36,11 @@ class Coat:
             return np.ones((region.height, region.width), np.float32)
         rows, columns = np.mgrid[region.pixels]
         bearings = camera.bearing(np.stack((columns, rows), axis=-1).reshape(-1, 2).astype(float))
-        cosine = np.nan_to_num(np.abs(bearings @ cam_from_obj.R[:, 2]))
+        if isinstance(cam_from_obj, RollingPose):
+            along_normal = np.sum(bearings * cam_from_obj.at_rows(rows.ravel()).R[..., 2], axis=-1)
+        else:
+            along_normal = bearings @ cam_from_obj.R[:, 2]
+        cosine = np.nan_to_num(np.abs(along_normal))
         found = np.interp(cosine, np.linspace(0.0, 1.0, ANGLES), self.transmission)
         return found.reshape(region.height, region.width).astype(np.float32)
 

@@ -55,6 +55,7 @@ class RayCamera:
         means, weights = [np.zeros((0, 3), np.float32)], [np.zeros(0, np.float32)]
         for part in _parts(pixels, max(1, MAX_RAYS // samples)):
             value, weight = radiance(self._rays(device, part, samples, seed, numbers))
+            backend.jit().eval(value, weight)  # at once: each channel by itself would trace all rays again
             means.append(np.stack([_mean(channel, samples) for channel in value], axis=1))
             weights.append(_mean(weight, samples))
         return np.concatenate(means), np.concatenate(weights)
@@ -70,8 +71,11 @@ class RayCamera:
         row = pixel // width
         x, y = mi.Float(pixel - row * width) + spread[0] - 0.5, mi.Float(row) + spread[1] - 0.5
         rays = device.rays(x, y)
-        origin = mi.Vector3f(*device.origin) + dr.zeros(mi.Vector3f, len(pixels) * samples)
-        return PixelRays(origin, dr.normalize(rays.direction), rays.seen, spread[2:], keyed_sampler(pixel, ray, key))
+        origin = mi.Vector3f(*rays.origin) + dr.zeros(mi.Vector3f, len(pixels) * samples)
+        found = PixelRays(origin, dr.normalize(rays.direction), rays.seen, spread[2:], keyed_sampler(pixel, ray, key))
+        # A kernel of its own, so that the large ones that trace the rays are compiled once for all lenses.
+        dr.eval(found.origin, found.direction, found.seen, pixel, ray)
+        return found
 
 
 def _mean(values: DeviceFloat, samples: int) -> NDArray[np.float32]:

@@ -19,17 +19,21 @@ from render.device import (
     DeviceBool,
     DeviceBox,
     DeviceFloat,
+    DeviceMatrix3,
     DevicePoint2,
+    DevicePoint3,
     DeviceRay,
     DeviceRayDifferential,
     DeviceSpectrum,
     DeviceVector3,
 )
 from render.lens_law import DeviceLens, device_lens, incidence_angle
+from render.motion import RollingPose
 from render.targets.image_region import Region
 
 SENSOR = "eposit_fisheye"
 HALF_PIXEL = 0.5
+ROW_NUMBERS = 12  # nine of a rotation, three of an origin
 CROP = ("offset_x", "offset_y", "width", "height")  # of a film, in the order of a Region
 
 
@@ -52,7 +56,22 @@ def tile_sensor(camera: Camera, cam_from_obj: Pose, tile: Region, samples: int, 
     """
     shifted = camera.replace(cx=camera.cx - tile.x, cy=camera.cy - tile.y, width=tile.width, height=tile.height)
     film = _film(tile.width, tile.height, "rgba")
-    return backend.load().load_dict(_description(shifted, cam_from_obj, film, samples, world_from_obj))
+    sensor = backend.load().load_dict(_description(shifted, cam_from_obj, film, samples, world_from_obj))
+    if isinstance(cam_from_obj, RollingPose):
+        sensor.rows = _row_placements(cam_from_obj, tile, world_from_obj)
+    return sensor
+
+
+def _row_placements(cam_from_obj: RollingPose, tile: Region, world_from_obj: Array) -> DeviceFloat:
+    """ROW_NUMBERS numbers for each row of a tile: rotation and origin of the scene's frame from the camera's.
+
+    A tile's rows below the picture have the poses of a longer picture; nobody sees them.
+    """
+    obj_from_cam = cam_from_obj.at_rows(np.arange(tile.y, tile.y + tile.height)).inverse()
+    rotation = world_from_obj[:3, :3] @ obj_from_cam.R
+    origin = obj_from_cam.t @ world_from_obj[:3, :3].T + world_from_obj[:3, 3]
+    table = np.concatenate((rotation.reshape(-1, 9), origin), axis=1)
+    return backend.load().Float(table.astype(np.float32).ravel())
 
 
 def _description(
@@ -126,6 +145,7 @@ def register_sensor() -> None:
             self.rotation, self.origin = mi.Matrix3f(to_world[:3, :3]), mi.Point3f(to_world[:3, 3])
             # Opaque, so that one kernel serves all poses, regions and cameras of a lens.
             dr.make_opaque(self.scale, self.shift, self.rotation, self.origin)
+            self.rows: DeviceFloat | None = None  # a placement for each row of the film, under a rolling shutter
             self.m_needs_sample_2 = True
 
         def sample_ray(
@@ -137,10 +157,22 @@ def register_sensor() -> None:
             active: DeviceBool | bool = True,
         ) -> tuple[DeviceRay, DeviceSpectrum]:
             direction, seen = _direction(self.law, sample2 * self.scale + self.shift)
+            rotation, origin = self.placement(sample2.y)
             ray = dr.zeros(mi.Ray3f, dr.width(direction))
-            ray.o, ray.d, ray.time = mi.Point3f(self.origin), dr.normalize(self.rotation @ direction), time
+            ray.o, ray.d, ray.time = mi.Point3f(origin), dr.normalize(rotation @ direction), time
             ray.maxt = dr.select(seen, dr.largest(mi.Float), 0.0)
+            # A kernel of its own, so that the large one that traces the rays is compiled once for all lenses.
+            dr.eval(ray, seen)
             return ray, dr.select(seen, mi.Spectrum(1.0), mi.Spectrum(0.0))
+
+        def placement(self, down: DeviceFloat) -> tuple[DeviceMatrix3, DevicePoint3]:
+            """Rotation and origin at the time of the row that lies at a height of the film, from 0 to 1."""
+            if self.rows is None:
+                return self.rotation, self.origin
+            rows = dr.width(self.rows) // ROW_NUMBERS
+            row = dr.clip(dr.floor(down * rows), 0.0, rows - 1.0)
+            numbers = [dr.gather(mi.Float, self.rows, mi.UInt32(row) * ROW_NUMBERS + i) for i in range(ROW_NUMBERS)]
+            return mi.Matrix3f(*numbers[:9]), mi.Point3f(*numbers[9:])
 
         def sample_ray_differential(
             self,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import gc
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,6 +65,7 @@ def prepared(world: World, draw: WorldDraw, target: AnyTarget, light: Light) -> 
         ValueError: no light reaches the target, or the user's scene cannot be used.
     """
     prepared.cache_clear()
+    gc.collect()
     gain = metered_gain(world, draw, target, light)
     return tracer_of(world, draw, target, light), gain
 
@@ -102,12 +104,15 @@ def _card_radiance(tracer: Tracer, target: AnyTarget) -> NDArray[np.float32]:
         np.column_stack((x, y, np.full(x.size, -CARD_GAP_MM), np.ones(x.size))) @ tracer.composition.world_from_obj.T
     )
     inwards = tracer.composition.world_from_obj[:3, 2] / np.linalg.norm(tracer.composition.world_from_obj[:3, 2])
-    origins = np.repeat(points[:, :3], METER_RAYS, axis=0).astype(np.float32)
+    origins = np.repeat(points[:, :3], METER_RAYS, axis=0)
     sampler = mi.load_dict({"type": "independent", "sample_count": 1})
     sampler.seed(METER_SEED, len(origins))
-    ray = mi.Ray3f(mi.Point3f(*origins.T), mi.Vector3f(*(float(v) for v in inwards)))
+    ray = mi.Ray3f(
+        mi.Point3f(*(backend.upload(part) for part in origins.T)), mi.Vector3f(*backend.opaque(*inwards))
+    )
     with dr.suspend_grad():
         radiance, _, _ = tracer.integrator.sample(tracer.scene, sampler, mi.RayDifferential3f(ray))
+        dr.eval(radiance)
     return np.array(radiance).T
 
 

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eposit import Camera, Pose
+from render.motion import PoseRate
 from render.region import Image
-from render.sensor.motion import Exposure, PoseRate
+from render.sensor.motion import Exposure
 from render.sensor.motion_blur import motion_blurred
 from render.sensor.noise import electron_noise
 from render.sensor.optics import disc_kernel, natural_falloff, normalised_axes, vignetting_gain

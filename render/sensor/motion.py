@@ -9,30 +9,11 @@ from numpy.typing import NDArray
 
 from eposit import Camera, Pose
 from eposit.arrays import Array
-from eposit.pose import rotation_from_vector
+from render.motion import PoseRate
 from render.targets import Target
 from render.targets.image_region import Region
 
 STEP_PX = 16  # between the pixels where the motion is computed; it is bilinear between them
-
-
-@dataclass(frozen=True, slots=True)
-class PoseRate:
-    """Time derivative of a pose cam_from_obj."""
-
-    velocity_mm_per_s: Array  # (3,) of the object frame's origin, camera axes
-    turn_rad_per_s: Array  # (3,) rotation vector per second, camera axes
-
-    def moved(self, pose: Pose, seconds: float) -> Pose:
-        """The pose after a time of even motion."""
-        turn = rotation_from_vector(self.turn_rad_per_s * seconds)
-        return Pose(turn @ pose.R, pose.t + self.velocity_mm_per_s * seconds)
-
-    @staticmethod
-    def about(pose: Pose, point_in_obj: Array, velocity_mm_per_s: Array, turn_rad_per_s: Array) -> PoseRate:
-        """The rate at which a point of the object moves with a velocity while the object turns about it."""
-        arm = -(pose.R @ point_in_obj)
-        return PoseRate(velocity_mm_per_s + np.cross(turn_rad_per_s, arm), turn_rad_per_s)
 
 
 @dataclass(frozen=True, slots=True)

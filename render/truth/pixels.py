@@ -12,6 +12,7 @@ from eposit import Camera, Pose
 from eposit.arrays import Array
 from render import backend
 from render.device import DeviceScene
+from render.truth.placement import in_world, poses_at
 
 NOTHING = 0  # object id of a pixel that shows the sky, or that the lens does not see
 
@@ -38,7 +39,7 @@ def pixel_truth(
     bearing = camera.bearing(np.column_stack((x.ravel(), y.ravel())))
     seen = np.all(np.isfinite(bearing), axis=1)
     bearing = np.where(seen[:, None], bearing, (0.0, 0.0, 1.0))
-    distance, normal, identity = _hits(scene, world_from_obj, names, bearing, cam_from_obj)
+    distance, normal, identity = _hits(scene, world_from_obj, names, bearing, cam_from_obj, camera.height)
     hit = seen & np.isfinite(distance)
     distance, identity = np.where(hit, distance, np.inf), np.where(hit, identity, NOTHING)
     with np.errstate(invalid="ignore"):
@@ -55,18 +56,27 @@ def pixel_truth(
 
 
 def _hits(
-    scene: Any, world_from_obj: Array, names: tuple[str, ...], bearing: Array, cam_from_obj: Pose
+    scene: Any, world_from_obj: Array, names: tuple[str, ...], bearing: Array, cam_from_obj: Pose, height: int
 ) -> tuple[Array, Array, NDArray[np.int64]]:
-    """(n,) distance, mm; (n, 3) normal in camera axes; (n,) object ids."""
+    """(n,) distance, mm; (n, 3) normal in camera axes; (n,) object ids.
+
+    height: of the picture whose pixels the (n, 3) bearings are, row by row.
+    """
     mi = backend.load()
     rotation, scale = _rotation_and_scale(world_from_obj)
-    world_from_cam = rotation @ cam_from_obj.R.T
-    origin = world_from_obj @ np.append(cam_from_obj.inverse().t, 1.0)
-    direction = (bearing @ world_from_cam.T).astype(np.float32)
-    ray = mi.Ray3f(mi.Point3f(*(float(v) for v in origin[:3])), mi.Vector3f(*direction.T))
+    poses = poses_at(cam_from_obj, np.arange(height))
+    bands = len(poses.t)  # of pixels that are exposed at one time
+    cam_from_world = poses.R @ rotation.T
+    origin = np.repeat(in_world(world_from_obj, poses.inverse().t), len(bearing) // bands, axis=0).astype(np.float32)
+    direction = (bearing.reshape(bands, -1, 3) @ cam_from_world).reshape(-1, 3).astype(np.float32)
+    ray = mi.Ray3f(
+        mi.Point3f(*(backend.upload(part) for part in origin.T)),
+        mi.Vector3f(*(backend.upload(part) for part in direction.T)),
+    )
     found = scene.ray_intersect(ray)
-    normal = np.array(found.n).T @ world_from_cam
-    return np.array(found.t, np.float64) / scale, normal, _identities(scene, names, found)
+    backend.jit().eval(found)  # at once: each part of it by itself would trace all rays again
+    normal = np.array(found.n).T.reshape(bands, -1, 3) @ np.swapaxes(cam_from_world, 1, 2)
+    return np.array(found.t, np.float64) / scale, normal.reshape(-1, 3), _identities(scene, names, found)
 
 
 def _identities(scene: Any, names: tuple[str, ...], found: Any) -> NDArray[np.int64]:

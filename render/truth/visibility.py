@@ -9,6 +9,8 @@ import numpy as np
 from eposit import Camera, Pose
 from eposit.arrays import Array, Mask
 from render import backend
+from render.motion import image_points
+from render.truth.placement import in_world, poses_at
 
 GAP_MM = 0.5  # before a point where its ray ends; a ray at 80 degrees from the normal is then 0.09 mm off the board
 
@@ -21,14 +23,18 @@ def visible_points(
     points: (n, 3) in the object frame, mm. has_target: whether the target is in the scene; if not, nothing is visible.
     """
     mi = backend.load()
-    centre = cam_from_obj.inverse().t
-    facing = centre[2] < points[:, 2]
-    in_picture = camera.contains(camera.project(cam_from_obj.apply(points)))
+    images = image_points(camera, cam_from_obj, points)
+    centre = poses_at(cam_from_obj, np.nan_to_num(images[:, 1])).inverse().t
+    facing = centre[:, 2] < points[:, 2]
+    in_picture = camera.contains(images)
     way = points - centre
     distance = np.linalg.norm(way, axis=1)
     scale = float(np.linalg.norm(world_from_obj[:3, 0]))
     direction = (way / distance[:, None]) @ (world_from_obj[:3, :3] / scale).T
-    origin = world_from_obj @ np.append(centre, 1.0)
-    ray = mi.Ray3f(mi.Point3f(*(float(v) for v in origin[:3])), mi.Vector3f(*direction.T.astype(np.float32)))
-    ray.maxt = mi.Float(((distance - GAP_MM) * scale).astype(np.float32))
+    origin = np.repeat(in_world(world_from_obj, centre), len(points) // len(centre), axis=0).astype(np.float32)
+    ray = mi.Ray3f(
+        mi.Point3f(*(backend.upload(part) for part in origin.T)),
+        mi.Vector3f(*(backend.upload(part) for part in direction.T)),
+    )
+    ray.maxt = backend.upload((distance - GAP_MM) * scale)
     return facing & in_picture & ~np.array(scene.ray_test(ray)) & has_target

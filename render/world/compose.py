@@ -23,6 +23,7 @@ from render.world.open_air import environment, sky
 from render.world.room import room
 from render.world.scene_file import SceneFileError
 from render.world.shapes import MeshShape, Objects
+from render.world.spares import chosen, is_spare, specks
 from render.world.studio import studio
 from render.world.things import clutter, occluders, other_boards
 from render.world.user_scene import first_line, user_scene, world_from_obj
@@ -36,6 +37,11 @@ class Composition:
     world_from_obj: Array  # (4, 4) from the object frame, mm, to the scene's frame and units; else the identity
     shows_emitters: bool  # whether the camera sees lamps, sky and environment
     has_medium: bool = False  # whether there is fog or the like
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of all that can be seen; a place in it plus 1 is an object's id."""
+        return tuple(name for name in self.objects if not is_spare(name))
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,18 +66,33 @@ def compose(world: World, draw: WorldDraw, target: AnyTarget, light: Light, part
     """
     objects = _surroundings(world, draw, target, light)
     has_medium = world.surround == "scene" and user_scene(Path(world.file), world.file_sha256).has_medium
-    objects |= clutter(draw.clutter, target, _rng(draw, 1))
-    objects |= other_boards(draw.boards, target, _rng(draw, 2))
-    if parts.has_occluders:
-        objects |= occluders(draw.occluders, target, _rng(draw, 3))
-    if parts.has_card:
-        objects |= card_shapes(target)
-    elif draw.has_target:
-        objects |= target_shapes(target, functools.partial(_coat, world, draw))
-    if world.surround in ("room", "sky") and draw.has_target:
-        objects |= stand_shapes(target, world.floor_mm)
+    objects |= _things(world, draw, target, parts)
+    board = card_shapes(target) if parts.has_card else target_shapes(target, functools.partial(_coat, world, draw))
+    stand = stand_shapes(target, world.floor_mm) if world.surround in ("room", "sky") else {}
+    if draw.has_target:
+        objects |= board | stand
+    else:
+        objects |= (board if parts.has_card else specks(board, target)) | specks(stand, target)
+    objects = _spares_last(objects)
     matrix = world_from_obj(world, target) if world.surround == "scene" else np.eye(4)
     return Composition(_in_scene(objects, matrix), matrix, world.surround != "studio", has_medium)
+
+
+def _things(world: World, draw: WorldDraw, target: AnyTarget, parts: Parts) -> Objects:
+    """Clutter, other boards and occluders: as many as drawn and, where each pose draws, specks up to the most."""
+    found: Objects = {}
+    for group, (make, name) in enumerate(((clutter, "clutter"), (other_boards, "boards"), (occluders, "occluders")), 1):
+        if make is occluders and not parts.has_occluders:
+            continue
+        count = getattr(draw, name)
+        most = getattr(world, name)[1] if world.draw == "pose" else count
+        found |= chosen(make(most, target, _rng(draw, group)), count, target)
+    return found
+
+
+def _spares_last(objects: Objects) -> Objects:
+    """The same objects in the order of their kinds, so that specks take no numbers from the others."""
+    return dict(sorted(objects.items(), key=lambda item: is_spare(item[0])))
 
 
 def load_scene(
@@ -94,7 +115,7 @@ def load_objects(objects: Objects, matrix: Array | None = None) -> DeviceScene:
 def _loaded(objects: Objects) -> DeviceScene:
     try:
         # Not optimised: Mitsuba would merge meshes, and each object has an id of its own.
-        return backend.load().load_dict({"type": "scene", **objects}, optimize=False)
+        return backend.load().load_dict({"type": "scene", **objects}, parallel=False, optimize=False)
     except RuntimeError as error:  # of a file that a plugin cannot read, such as an environment map
         raise SceneFileError(f"Mitsuba cannot load the world: {first_line(error)}; mend the file") from None
 

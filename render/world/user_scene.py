@@ -33,7 +33,7 @@ def user_scene(path: Path, sha256: str) -> UserScene:
     """
     mi, scene_file = backend.load(), read_scene_file(path)
     try:
-        scene = mi.load_string(scene_file.text, optimize=False)
+        scene = mi.load_string(scene_file.text, parallel=False, optimize=False)
     except Exception as error:  # Mitsuba raises whatever a plugin does
         raise SceneFileError(f"Mitsuba cannot load {path}: {first_line(error)}; mend the scene") from None
     if not isinstance(scene, mi.Scene):

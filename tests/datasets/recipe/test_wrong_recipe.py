@@ -81,6 +81,10 @@ RECIPES = {
         added("[sensor]\nexposure_s = -0.1"),
         "sensor exposure_s is -0.1; it must lie in 0 to 1",
     ),
+    "rows read backwards": (
+        added("[optics]\nline_time_us = -1.0"),
+        "optics line_time_us is -1.0; it must lie in 0 to 1000 microseconds",
+    ),
     "negative full well": (added("[sensor]\nfull_well_e = -1"), "sensor full_well_e is -1.0; it must lie in 0 to"),
     "read noise without electrons": (added("[sensor]\nread_noise_e = 2.5"), "give full_well_e, which says how many"),
     "all light lost": (added("[sensor]\nvignetting = 1.0"), "sensor vignetting is 1.0; it must lie in 0 to 0.95"),

@@ -10,7 +10,7 @@ import pytest
 from datasets.store.dataset import open_dataset
 from datasets.store.manifest import MANIFEST_FILE
 from datasets.store.provenance import Provenance
-from datasets.store.verify import verify
+from datasets.verify import verify
 from pipelines.machine import LIBRARIES, blas, commit, provenance
 from tests.wrong_input import first
 

@@ -33,6 +33,7 @@ def both(place, cli):
     old = new.with_name("old")
     shutil.copytree(new, old)
     make_old(old)
+    open_dataset(old).write_manifest()
     return new, old
 
 
@@ -113,6 +114,7 @@ def old_default(place, cli, monkeypatch):
     assert cli("generate", given, "--out", root, "--reuse", place.source, "-q").code == 0
     (root / "recipe.toml").write_text(text)
     make_old(root)
+    (root / "manifest.json").unlink()
     monkeypatch.setattr("datasets.plan.LEAST_SHARD_FRAMES", 1)  # today's default cuts two frames into two shards
     return place.recipe(text), root
 

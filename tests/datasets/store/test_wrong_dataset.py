@@ -7,7 +7,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from tests.wrong_input import alone, assert_one_sentence, assert_refused, first, garbage, on_dataset, put_image
+from tests.wrong_input import alone, assert_one_sentence, assert_refused, doctor, first, garbage, on_dataset, put_image
 
 
 def damaged(file, change, *words, without=()):
@@ -33,7 +33,7 @@ def gone(data):
 
 def not_a_png(*words):
     def arrange(place):
-        root = place.dataset(without=["detections"])
+        root = place.dataset(without=["detections"] if words[0] == "detect" else [])
         put_image(root, b"not a PNG")
         return words[0], root, *words[1:]
 
@@ -80,10 +80,7 @@ def before_generate(place):
 
 def _mixed(root):
     """A dataset with a sound shard that carries another recipe's hash."""
-    path = first(root, "frames")
-    table = pq.read_table(path)
-    other = {**table.schema.metadata, b"recipe": b"0" * 64}
-    pq.write_table(table.replace_schema_metadata(other), path)
+    doctor(first(root, "frames"), lambda rows: rows, recipe="0" * 64)
     return root
 
 
@@ -112,25 +109,28 @@ PLACES = {
 
 
 FILES = {
-    "truncated frames": (damaged("frames", half, "detect", without=["detections"]), "delete it and run the generate"),
-    "truncated frames, verify": (damaged("frames", half, "verify"), "is damaged; delete it"),
-    "garbage keypoints": (damaged("keypoints", garbage, "report"), "is damaged; delete it and run the generate stage"),
+    "truncated frames": (
+        damaged("frames", half, "detect", without=["detections"]),
+        "is damaged: it cannot be read; `repair ",
+    ),
+    "truncated frames, verify": (damaged("frames", half, "verify"), "is damaged: it cannot be read"),
+    "garbage keypoints": (damaged("keypoints", garbage, "report"), "is damaged: it cannot be read; `repair "),
     "garbage detections": (
         damaged("detections", garbage, "estimate", "--solver", "posit"),
-        "is damaged; delete it and run the detect stage",
+        "is damaged: it cannot be read; `repair ",
     ),
-    "truncated estimates": (damaged("estimates", half, "score"), "is damaged; delete it and run the estimate stage"),
-    "empty scores": (damaged("scores", lambda data: b"", "report"), "is damaged; delete it and run the score stage"),
+    "truncated estimates": (damaged("estimates", half, "score"), "is damaged: it cannot be read; `repair "),
+    "empty scores": (damaged("scores", lambda data: b"", "report"), "is damaged: it cannot be read; `repair "),
     "scores damaged under another stage": (
         damaged("scores", garbage, "estimate", "--solver", "posit"),
-        "is damaged; delete it and run the score stage",
+        "is damaged: it cannot be read; `repair ",
     ),
     "shard of another dataset": (
         lambda place: ("detect", _mixed(place.dataset(without=["detections"]))),
-        "belongs to another recipe; delete it",
+        "belongs to another recipe; `repair ",
     ),
-    "truncated master": (damaged("masters", half, "verify"), "cannot be read as a linear image"),
-    "garbage master": (damaged("masters", garbage, "verify"), "cannot be read as a linear image"),
+    "truncated master": (damaged("masters", half, "verify"), "is damaged: it cannot be read; `repair "),
+    "garbage master": (damaged("masters", garbage, "verify"), "is damaged: it cannot be read; `repair "),
     "missing master": (damaged("masters", gone, "verify"), "is missing; run the generate stage"),
     "image is no PNG": (not_a_png("detect"), "the image is not an 8-bit PNG, grey or in colour"),
     "image is no PNG, verify": (not_a_png("verify"), "the image is not an 8-bit PNG, grey or in colour"),

@@ -4,8 +4,9 @@ import numpy as np
 
 from pipelines.detection import detect_points
 from pipelines.detection.board_map import BoardMap
-from pipelines.detection.finders import Found, find_board
+from pipelines.detection.finders import find_board
 from pipelines.detection.first_map import first_map
+from pipelines.detection.seen_points import SeenPoints
 from tests.pipelines.detection.test_board_map import CAMERAS, CORNERS, SIZE, placed, rms
 from tests.pipelines.detection.test_finders import TARGET, drawn
 
@@ -18,9 +19,11 @@ def test_rough_corners_beside_the_circle_take_no_part_in_the_first_map(monkeypat
     found = find_board(image, TARGET)
 
     def detected(shift_px):
-        corners = found.corners_px.copy()
+        corners = found.points_px.copy()
         corners[BESIDE_CIRCLE] += shift_px
-        monkeypatch.setattr("pipelines.detection.find_board", lambda image, target: Found(corners, found.finder))
+        monkeypatch.setattr(
+            "pipelines.detection.find_board", lambda image, target: SeenPoints(found.ids, corners, found.finder)
+        )
         return detect_points(image, TARGET)
 
     expected, shifted = detected(0.0), detected([3.0, -2.0])
@@ -34,7 +37,7 @@ def test_a_rough_fit_is_not_pulled_by_corners_that_are_off():
     rng = np.random.default_rng(3)
     pixels = CAMERAS["equidistance"](placed("near", CORNERS)) + 0.3 * rng.standard_normal((54, 2))
     pixels[[4, 17, 40]] += [[6.0, -3.0], [-5.0, 5.0], [0.0, 8.0]]
-    rough = first_map(pixels, SIZE, TARGET)
+    rough = first_map(SeenPoints(np.arange(54), pixels, "rough"), SIZE, TARGET)
     plain = BoardMap.fit(CORNERS, pixels, SIZE, np.ones(54))
     # Noise of 0.3 px leaves 0.3 sqrt(13 / 108) = 0.10 px; measured 0.10 to 0.16 over six draws, and 0.34 to 0.41 for
     # the plain fit.

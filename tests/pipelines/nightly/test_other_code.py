@@ -5,7 +5,7 @@ import shutil
 import pytest
 
 from datasets.store.dataset import open_dataset
-from datasets.store.verify import verify
+from datasets.verify import verify
 from pipelines.nightly.other_code import ROOT, Code, OtherCodeError, digest_of, freeze
 
 

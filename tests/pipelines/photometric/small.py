@@ -8,8 +8,8 @@ from eposit import Camera, Pose
 from eposit.pose import rotation_error_vector, rotation_from_euler
 from render.frame import LinearImage, render_frame
 from render.light import Light
+from render.motion import PoseRate
 from render.sensor.develop import FrameContext, develop
-from render.sensor.motion import PoseRate
 from render.sensor.presets import regimes
 from render.targets.chessboard import Chessboard
 

@@ -16,7 +16,8 @@ import pytest
 
 from datasets.recipe.model import load_recipe
 from datasets.store.dataset import open_dataset
-from datasets.store.verify import verify
+from datasets.verify import verify
+from datasets.verify.problems import Kind
 from tests.conftest import command
 from tests.wrong_input import assert_one_sentence, files
 
@@ -77,7 +78,7 @@ def at_once(commands, name, number, longest, record):
 def assert_sound(root, before):
     """Every shard and linear image that is there is sound, and what was there before still is as it was."""
     _, problems = verify(open_dataset(root))
-    assert [problem for problem in problems if " is missing; " not in problem] == []
+    assert [problem for problem in problems if problem.kind != Kind.MISSING] == []
     kept = {path: found for path, found in before.items() if path.suffix in (".parquet", ".exr")}
     assert kept.items() <= files(root).items()
     assert list(root.rglob(".*")) == []

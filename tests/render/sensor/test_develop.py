@@ -12,8 +12,9 @@ from eposit.pose import rotation_from_euler
 from render.analytic.image_circle import lens_coverage
 from render.frame import render_frame
 from render.light import Light
+from render.motion import PoseRate
 from render.sensor.develop import FrameContext, develop
-from render.sensor.motion import Exposure, PoseRate, at_pixels
+from render.sensor.motion import Exposure, at_pixels
 from render.sensor.motion_blur import MIN_MOTION_PX, SHORT_MOTION_PX
 from render.sensor.noise import standard_normals
 from render.sensor.optics import disc_kernel, natural_falloff, vignetting_gain

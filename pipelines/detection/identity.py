@@ -1,0 +1,108 @@
+"""Which of a board's corners the points of a lattice are: by its size, its colours, its margin and its circle."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eposit.arrays import Array, Mask
+from pipelines.detection.square_look import CLEAR, DISC, SIDES, UNKNOWN, Look
+from pipelines.detection.statuses import PointStatus
+from render.targets.chessboard import Chessboard
+from render.targets.plain_chessboard import PlainChessboard
+
+TURNS = tuple(np.array(turn) for turn in (((1, 0), (0, 1)), ((0, -1), (1, 0)), ((-1, 0), (0, -1)), ((0, 1), (-1, 0))))
+AnyChessboard = Chessboard | PlainChessboard
+MIRROR = np.array(((-1, 0), (0, 1)))
+
+
+class Placement(NamedTuple):
+    """A lattice laid onto the board: column and row of its point c are `turn @ c + offset` on the board."""
+
+    turn: NDArray[np.int64]  # (2, 2)
+    offset: NDArray[np.int64]  # (2,)
+    disc: int  # what the square holds where the circle would be: DISC, CLEAR or UNKNOWN
+
+
+def identify(
+    shape: tuple[int, int], white_first: bool, look: Look, target: AnyChessboard, axes_px: Array
+) -> Placement | PointStatus:
+    """The one placement that all that is seen allows, or the status that says why there is none.
+
+    shape: columns and rows of the lattice. white_first: whether the square between its first points is white. axes_px:
+    (2, 2) directions in the picture, as columns, in which its columns and its rows rise.
+    """
+    seen = [p for turn in TURNS for p in _placements(turn, shape, white_first, look, target)]
+    if isinstance(target, PlainChessboard):
+        return _by_squares(seen, target, axes_px)
+    flipped = [p for turn in TURNS for p in _placements(turn @ MIRROR, shape, white_first, look, target)]
+    return _by_circle(seen, flipped)
+
+
+def _by_circle(seen: list[Placement], flipped: list[Placement]) -> Placement | PointStatus:
+    """Among the placements of the board, and those of its mirror image.
+
+    A placement that puts the circle on a square without one is out, unless all are: then the board has no circle.
+    """
+    shown, shown_flipped = ([p for p in some if p.disc == DISC] for some in (seen, flipped))
+    if shown_flipped and not shown:
+        is_open = any(p.disc == UNKNOWN for p in seen)
+        return PointStatus.ORIENTATION_AMBIGUOUS if is_open else PointStatus.MIRRORED
+    if not seen:
+        return PointStatus.OTHER_BOARD
+    left = shown or [p for p in seen if p.disc != CLEAR] or seen
+    return left[0] if len(left) == 1 and not shown_flipped else PointStatus.ORIENTATION_AMBIGUOUS
+
+
+def _by_squares(seen: list[Placement], target: PlainChessboard, axes_px: Array) -> Placement | PointStatus:
+    """Where half a turn makes no difference the board is read as standing upright: x to the right in the picture."""
+    if len(seen) == 2 and _is_half_turn(seen[0], seen[1], target.inner):
+        return max(seen, key=lambda p: float((axes_px @ p.turn.T[:, 0])[0]))
+    if len(seen) == 1:
+        return seen[0]
+    return PointStatus.ORIENTATION_AMBIGUOUS if seen else PointStatus.OTHER_BOARD
+
+
+def _is_half_turn(one: Placement, other: Placement, inner: tuple[int, int]) -> bool:
+    opposite = np.array_equal(one.turn, -other.turn)
+    return opposite and np.array_equal(one.offset + other.offset, np.array(inner) - 1)
+
+
+def _placements(
+    turn: NDArray[np.int64],
+    shape: tuple[int, int],
+    white_first: bool,
+    look: Look,
+    target: AnyChessboard,
+) -> list[Placement]:
+    """All with that turn that lie on the board, with black on black, and its borders where the margin is seen."""
+    corners = turn @ np.array(((0, shape[0] - 1), (0, shape[1] - 1)))
+    low, room = corners.min(axis=1), np.array(target.inner) - 1 - np.ptp(corners, axis=1)
+    if np.any(room < 0):
+        return []
+    x, y = (part.ravel() for part in np.meshgrid(*(np.arange(n + 1) for n in room), indexing="ij"))
+    offsets = np.stack((x, y), axis=1) - low
+    first = np.floor(turn @ (0.5, 0.5) + offsets).astype(np.int64)  # the square between the lattice's first points
+    use = (first.sum(axis=1) % 2 == 1) == white_first
+    for side, ends in zip(SIDES, look.ends, strict=True):
+        if ends:
+            use &= _touches(turn @ side, np.stack((x, y), axis=1), room)
+    return [Placement(turn, offset, _disc_at(turn, offset, look, target)) for offset in offsets[use]]
+
+
+def _touches(way: NDArray[np.int64], place: NDArray[np.int64], room: NDArray[np.int64]) -> Mask:
+    """Which places (n, 2) within the room leave none on the board's side that lies that way."""
+    axis = int(np.argmax(np.abs(way)))
+    return place[:, axis] == (0 if way[axis] < 0 else room[axis])
+
+
+def _disc_at(turn: NDArray[np.int64], offset: NDArray[np.int64], look: Look, target: AnyChessboard) -> int:
+    """What is seen where a placement puts the circle; UNKNOWN outside what was looked at, and for a board without."""
+    if isinstance(target, PlainChessboard):
+        return UNKNOWN
+    middle = np.array(target.circle_square) - 1.5  # the first inner corner is the board's (0, 0)
+    column, row = np.floor(turn.T @ (middle - offset)).astype(np.int64) + 1
+    rows, columns = look.discs.shape
+    return int(look.discs[row, column]) if 0 <= row < rows and 0 <= column < columns else UNKNOWN

@@ -1,0 +1,181 @@
+"""The chessboard in an image, whole or in part: its lattice is grown from saddles, and told apart from others.
+
+The work is bounded whatever the picture holds: a level has at most so many pixels and so many saddles, and a lattice
+at most so many rounds of growth. Levels, from the one that is looked at first: the picture reduced by powers of two,
+for large squares and blurred pictures; as it is; its textured region enlarged, for squares of a few pixels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eposit.arrays import Array
+from pipelines.detection.board_map import BoardMap
+from pipelines.detection.first_map import FIRM_HOLD
+from pipelines.detection.generic_lens import PARAMETERS
+from pipelines.detection.identity import AnyChessboard, Placement, identify
+from pipelines.detection.lattice_grid import Grid, axes, grid_of
+from pipelines.detection.lattice_growth import contrast_of, grow, look_at, looks, side_of, verified
+from pipelines.detection.levels import LevelOf, levels
+from pipelines.detection.saddle_links import link
+from pipelines.detection.saddles import Level, find_saddles, smooth
+from pipelines.detection.square_look import look_at_squares
+from pipelines.detection.statuses import PointStatus
+from render.targets.chessboard import Chessboard
+
+MOST_PIECES = 3  # of a level's lattices that are looked at, the largest
+LEAST_POINTS = 7  # of a lattice: fewer make no map
+LEAST_PART = 0.25  # of the board's corners; fewer are no board, unless all that is seen says which they are
+LEAST_TYPICAL = 0.8  # median likeness of a board's points; noise that happens to look like a lattice has less
+MOST_ROUGH = 0.08  # sides: root mean square distance of a board's points from the map through them; noise has more
+FIRM = 0.85  # of the lattice's median likeness: a point that looks less like a corner does not tell the lattice's size
+FIRM_CONTRAST = 0.5  # of its median contrast, likewise
+ENOUGH_PX = 16.0  # px of a level to a square: more show no more corners
+FARTHEST_GAP = 8  # columns and rows over which a lattice is looked for beyond what hides it
+
+
+@dataclass(frozen=True, slots=True)
+class SeenLattice:
+    """What one level shows of the board."""
+
+    status: PointStatus  # ok if it is known which corner is which
+    ids: NDArray[np.int64]  # (k,) rows in the target's corners; empty unless ok
+    points_px: Array  # (k, 2) px of the picture
+    count: int  # of the lattice's points
+    side_px: float  # of its squares, px of the picture
+
+    def is_better_than(self, other: SeenLattice | None) -> bool:
+        """Whether it tells more."""
+        if other is None:
+            return True
+        own, others = self.status == PointStatus.OK, other.status == PointStatus.OK
+        return (own, self.count) > (others, other.count)
+
+    def is_sharp_at(self, scale: float) -> bool:
+        """Whether the squares are so large that a level of that scale, if finer, shows no more of them."""
+        return self.status in (PointStatus.OK, PointStatus.MIRRORED) and self.side_px > ENOUGH_PX * 2.0 * scale
+
+
+def find_lattice(image: NDArray[np.uint8], target: AnyChessboard) -> SeenLattice | None:
+    """The board's corners as the level shows them that shows most; None if no level shows a lattice."""
+    best: SeenLattice | None = None
+    whole = target.inner[0] * target.inner[1]
+    for level in levels(image):
+        if best is not None and best.is_sharp_at(level.scale):
+            continue
+        for seen in _seen(level, target):
+            if seen.is_better_than(best):
+                best = seen
+        if best is not None and best.status == PointStatus.OK and best.count == whole:
+            break
+    return best
+
+
+def _seen(level: LevelOf, target: AnyChessboard) -> Iterator[SeenLattice]:
+    """What is known of the level's largest lattices."""
+    smoothed = smooth(level.grey)
+    most = max(target.inner) + 2
+    for piece in link(smoothed, find_saddles(smoothed))[:MOST_PIECES]:
+        grid = verified(smoothed, grid_of(piece))
+        if np.sum(grid.known) < LEAST_POINTS:
+            continue
+        grid = grow(smoothed, grid, most)
+        seen = _told(level, smoothed, grid, target)
+        if seen is not None:
+            yield seen
+
+
+def _told(level: LevelOf, smoothed: Level, grid: Grid, target: AnyChessboard) -> SeenLattice | None:
+    """Which corners the lattice's points are; None if they are too few."""
+    firm = _firm_part(smoothed, grid)
+    if np.sum(firm.known) < target.inner[0] * target.inner[1]:
+        firm = _firm_part(smoothed, _bridged(level, smoothed, firm, target))
+    count = int(np.sum(firm.known))
+    if count < LEAST_POINTS:
+        return None
+    board, side = _map(firm, level), side_of(*(steps[firm.known] for steps in axes(firm.points)))
+    if board is None or not _is_smooth(firm, board, side):
+        return None
+    radius = target.circle_radius_mm / target.square_mm if isinstance(target, Chessboard) else None
+    margin = target.margin_squares if isinstance(target, Chessboard) else target.margin_mm / target.square_mm
+    look = look_at_squares(level.grey, board, firm, radius, margin)
+    rows, columns = firm.points.shape[:2]
+    middle = (np.array([columns, rows]) - 1.0) / 2.0
+    told = identify((columns, rows), firm.white_first, look, target, board.jacobian(middle))
+    if isinstance(told, PointStatus):
+        enough = count >= LEAST_PART * target.inner[0] * target.inner[1]
+        return SeenLattice(told, np.empty(0, np.int64), np.empty((0, 2)), count, level.scale * side) if enough else None
+    corners = _on_board(smoothed, firm, board, told, target)
+    ids = np.flatnonzero(corners.known)
+    points = level.in_picture(corners.points.reshape(-1, 2)[ids])
+    return SeenLattice(PointStatus.OK, ids, points, len(ids), level.scale * side)
+
+
+def _firm_part(smoothed: Level, grid: Grid) -> Grid:
+    """The lattice up to the last columns and rows with more than one point that looks much like a corner."""
+    like, contrast = looks(smoothed, grid)
+    if not np.any(np.isfinite(like)) or np.nanmedian(like) < LEAST_TYPICAL:
+        return grid.with_points(np.full_like(grid.points, np.nan)).cropped()
+    with np.errstate(invalid="ignore"):
+        firm = (like > FIRM * np.nanmedian(like)) & (contrast > FIRM_CONTRAST * np.nanmedian(contrast))
+    rows, columns = np.flatnonzero(firm.sum(axis=1) > 1), np.flatnonzero(firm.sum(axis=0) > 1)
+    points = np.full_like(grid.points, np.nan)
+    if len(rows) and len(columns):
+        part = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+        points[part] = grid.points[part]
+    return grid.with_points(points).cropped()
+
+
+def _map(grid: Grid, level: LevelOf) -> BoardMap | None:
+    """From column and row of the lattice to the level; None where no camera could see its points so."""
+    y, x = np.nonzero(grid.known)
+    at, size = np.stack((x, y), axis=1).astype(np.float64), (level.grey.shape[1], level.grey.shape[0])
+    try:
+        return BoardMap.fit(at, grid.points[y, x], size, np.ones(len(at)), hold=FIRM_HOLD)
+    except np.linalg.LinAlgError:
+        return None
+
+
+def _is_smooth(grid: Grid, board: BoardMap, side: float) -> bool:
+    """Whether the points lie where the map through them says, but for what finding them leaves."""
+    y, x = np.nonzero(grid.known)
+    square = np.sum((board(np.stack((x, y), axis=1).astype(np.float64)) - grid.points[y, x]) ** 2)
+    free = max(1.0, 2.0 * len(x) - PARAMETERS)
+    return bool(np.sqrt(square / free) < MOST_ROUGH * side)
+
+
+def _bridged(level: LevelOf, smoothed: Level, grid: Grid, target: AnyChessboard) -> Grid:
+    """The lattice with its points beyond what hides others, where the board may reach that far."""
+    most = max(target.inner)
+    gap = min(FARTHEST_GAP, most - min(grid.points.shape[:2]))
+    board = _map(grid, level) if gap > 0 and np.sum(grid.known) >= LEAST_POINTS else None
+    if board is None:
+        return grid
+    wide = grid.padded(gap)
+    rows, columns = wide.points.shape[:2]
+    y, x = np.mgrid[0:rows, 0:columns]
+    cells = np.stack((x.ravel(), y.ravel()), axis=1) - float(gap)
+    found = look_at(smoothed, wide, board(cells).reshape(rows, columns, 2), contrast_of(smoothed, grid))
+    if not np.any(np.isfinite(found)):
+        return grid
+    return grow(smoothed, wide.with_points(np.where(wide.known[..., None], wide.points, found)).cropped(), most + 2)
+
+
+def _on_board(smoothed: Level, grid: Grid, board: BoardMap, placement: Placement, target: AnyChessboard) -> Grid:
+    """The board's own grid of corners: those of the lattice, and others that are seen where the map puts them."""
+    across, down = target.inner
+    y, x = np.mgrid[0:down, 0:across]
+    cells = (np.stack((x, y), axis=-1) - placement.offset) @ placement.turn  # of the board's corners in the lattice
+    column, row = np.moveaxis(cells, -1, 0)
+    rows, columns = grid.points.shape[:2]
+    within = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
+    points = np.full((down, across, 2), np.nan)
+    points[within] = grid.points[row[within], column[within]]
+    own = Grid(points, white_first=False)
+    expected = board(cells.reshape(-1, 2).astype(np.float64)).reshape(points.shape)
+    found = look_at(smoothed, own, expected, contrast_of(smoothed, grid))
+    return own.with_points(np.where(own.known[..., None], points, found))

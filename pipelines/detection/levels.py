@@ -1,0 +1,73 @@
+"""A picture at several sizes, the most promising first, none with more pixels than can be looked at quickly."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from eposit.arrays import Array
+from pipelines.detection.saddles import Level
+from pipelines.detection.textured_region import textured_region
+
+FIRST_PIXELS = 7e5  # of the level that is looked at first, at most
+MOST_PIXELS = 6.5e6  # of any
+LEAST_SIDE_PX = 60  # of a level
+ENLARGEMENT, LEAST_ENLARGEMENT, ENLARGED_PIXELS = 3.0, 1.3, 2.5e6
+
+
+@dataclass(frozen=True, slots=True)
+class LevelOf:
+    """A picture, or a part of it, reduced or enlarged."""
+
+    grey: Level
+    scale: float  # pixels of the picture to one of the level
+    first_px: Array  # (2,) px of the picture where the level's first pixel begins, 0.5 less than a pixel's centre
+
+    def in_picture(self, points: Array) -> Array:
+        """(n, 2) px of the level as px of the picture; pixel centres are at integers in both."""
+        return (points + 0.5) * self.scale - 0.5 + self.first_px
+
+    def in_level(self, points: Array) -> Array:
+        """(n, 2) px of the picture as px of the level."""
+        return (points - self.first_px + 0.5) / self.scale - 0.5
+
+
+def levels(image: NDArray[np.uint8]) -> Iterator[LevelOf]:
+    """The levels of an 8-bit picture (height, width)."""
+    whole = image.astype(np.float32)
+    first = 1
+    while whole.size / first**2 > FIRST_PIXELS:
+        first *= 2
+    finer = [first // 2**k for k in range(1, first.bit_length())]
+    yield from (_reduced(whole, scale) for scale in [first, *finer[:1]])
+    coarser = 2 * first
+    while min(whole.shape) / coarser >= LEAST_SIDE_PX:
+        yield _reduced(whole, coarser)
+        coarser *= 2
+    region = textured_region(image)
+    part, first_px = whole[region.pixels], np.array([region.x, region.y], np.float64)
+    for scale in finer[1:]:
+        if whole.size / scale**2 <= MOST_PIXELS:
+            yield _reduced(whole, scale)
+        elif part.size / scale**2 <= MOST_PIXELS:
+            yield _reduced(part, scale, first_px)
+    enlargement = min(ENLARGEMENT, float(np.sqrt(ENLARGED_PIXELS / part.size)))
+    if enlargement >= LEAST_ENLARGEMENT:
+        large = cv2.resize(part, None, fx=enlargement, fy=enlargement, interpolation=cv2.INTER_CUBIC)
+        yield LevelOf(np.asarray(large, np.float32), 1.0 / enlargement, first_px)
+
+
+def _reduced(whole: Level, scale: int, first_px: Array | None = None) -> LevelOf:
+    """Means over squares of pixels; what is left over at the right and at the bottom is left out."""
+    origin = np.zeros(2) if first_px is None else first_px
+    if scale == 1:
+        return LevelOf(whole, 1.0, origin)
+    height, width = (size // scale for size in whole.shape)
+    part = whole[: height * scale, : width * scale]
+    return LevelOf(
+        np.asarray(cv2.resize(part, (width, height), interpolation=cv2.INTER_AREA), np.float32), float(scale), origin
+    )

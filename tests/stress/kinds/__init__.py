@@ -1,0 +1,5 @@
+"""All kinds, by name."""
+
+from tests.stress.kinds import boards, cameras, light, optics, pictures
+
+KINDS = {kind.name: kind for module in (optics, light, cameras, pictures, boards) for kind in module.KINDS}
