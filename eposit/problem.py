@@ -114,8 +114,13 @@ def as_weights(sigma_px: ArrayLike | None, n: int) -> tuple[Array, float]:
     factor = whitening(sigma, n)
     if sigma.ndim == 0:
         return EQUAL_WEIGHTS, float(sigma) ** 2
+    return inverse_covariances(factor), 1.0
+
+
+def inverse_covariances(factor: Array) -> Array:
+    """(n, 3) W^T W, as (xx, xy, yy), of (2, 2, n) matrices W as `whitening` gives them."""
     (a, b), (c, d) = factor
-    return np.stack((a * a + c * c, a * b + c * d, b * b + d * d), axis=-1), 1.0
+    return np.stack((a * a + c * c, a * b + c * d, b * b + d * d), axis=-1)
 
 
 LENS_KINDS = {
