@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eposit.arrays import Array, Mask, take_last
+from eposit.arrays import Array, Mask
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -60,15 +60,6 @@ class PoseBatch:
     t: Array  # (3, b), unit of the object points
     iterations: NDArray[np.int64]  # (b,)
     converged: Mask  # (b,)
-
-    def put(self, rows: NDArray[np.int64], other: PoseBatch) -> None:
-        """Overwrite some rows with those of another result; iterations add up."""
-        self.R[..., rows], self.t[:, rows], self.converged[rows] = other.R, other.t, other.converged
-        self.iterations[rows] += other.iterations
-
-    def take(self, rows: NDArray[np.int64]) -> PoseBatch:
-        """Some of the rows."""
-        return PoseBatch(take_last(self.R, rows), take_last(self.t, rows), self.iterations[rows], self.converged[rows])
 
 
 def rotation_from_euler(angles: ArrayLike) -> Array:
