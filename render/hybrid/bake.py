@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from eposit.arrays import Array
 from render import backend
 from render.device import DeviceFloat, DeviceScene, DeviceSpectrum
+from render.hybrid.coat import matt_white
 from render.hybrid.keyed_sampler import keyed_sampler, lattice_numbers
 from render.hybrid.outgoing import NUMBERS, direct_light, rest_of_light
 from render.hybrid.placement import Placement
@@ -82,15 +83,16 @@ class Baker:
             board[edges] = self._light(points, fine.step, self._direct, self.samples, 16).mean(axis=0)
 
     def _disc(self, target: Chessboard) -> Array:
-        """(3,) mean over the raised circle's front."""
+        """(3,) mean over the raised circle's front, which is matt on every board."""
         step = 2.0 * target.circle_radius_mm / DISC_TEXELS
         side = (np.arange(DISC_TEXELS) + 0.5) * step - target.circle_radius_mm
         x, y = (values.ravel() for values in np.meshgrid(side, side))
         inside = np.hypot(x, y) < target.circle_radius_mm - 0.75 * step
         points = target.circle_centre + np.column_stack((x, y, 0.0 * x))[inside]
+        paper = replace(self, sheet=matt_white())
         direct, rest = (
-            self._light(points, (step, step), light, 16 * self.samples, 24 + i)
-            for i, light in enumerate((self._direct, self._rest))
+            paper._light(points, (step, step), light, 16 * self.samples, 24 + i)
+            for i, light in enumerate((paper._direct, paper._rest))
         )
         return (direct + rest).mean(axis=(0, 1))
 

@@ -12,10 +12,14 @@ from render.world import World, draw_world
 TARGET, LIGHT = Chessboard(columns=5, rows=4), Light()  # small: its bake is quick
 
 
+def baked(surface):
+    world = World(method="hybrid", path_depth=2, bake_samples=64, surface=surface)
+    return baked_light(world, draw_world(world, np.random.default_rng(1)), TARGET, LIGHT)
+
+
 @pytest.fixture(scope="module")
 def studio():
-    world = World(method="hybrid", path_depth=2, bake_samples=64)
-    return baked_light(world, draw_world(world, np.random.default_rng(1)), TARGET, LIGHT)
+    return baked("matt")
 
 
 def test_the_studios_light_is_that_of_the_closed_form(studio):
@@ -25,6 +29,11 @@ def test_the_studios_light_is_that_of_the_closed_form(studio):
     assert error.std() < 0.01
     assert abs(error.mean()) < 0.001
     np.testing.assert_allclose(studio.disc, disc, rtol=0.005)
+
+
+def test_the_circle_is_matt_on_a_laminated_board(studio):
+    """A laminate changes what the paint below it gets from each direction; the circle has none, and gets the same."""
+    np.testing.assert_allclose(baked("laminated").disc, studio.disc, rtol=1e-6)
 
 
 def test_nothing_is_darker_around_the_circle(studio):
