@@ -31,6 +31,7 @@ COMMANDS: tuple[tuple[Callable[..., None], str], ...] = (
     (stages.demo, "demo --out out/demo"),
     (compare.compare, "compare out/before out/after"),
     (tools.verify, "verify out/demo"),
+    (stages.repair, "repair out/demo"),
     (tools.doctor, "doctor"),
     (tools.bench, "bench demo --only render --only solver --out bench.md"),
     (tools.paper, "paper --points-only --out out/paper"),

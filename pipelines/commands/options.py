@@ -31,6 +31,9 @@ Shard = Annotated[
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for machines, instead of text.")]
+Rerender = Annotated[
+    int, typer.Option(min=0, metavar="N", help="Render N frames, spread over the dataset, anew and compare them, too.")
+]
 Regime = Annotated[
     str | None, typer.Option(help="Sensor regime, as if the recipe said so: clean, typical, paper or harsh.")
 ]

@@ -191,6 +191,29 @@ def bound(
         stages.run_bound(dataset, execution)
 
 
+def repair(
+    folder: o.Folder,
+    workers: o.Workers = 1,
+    engine: o.EngineName = "local",
+    ray_address: o.RayAddress = None,
+    quiet: o.Quiet = False,
+) -> None:
+    """Make again what is damaged or missing, and nothing else; what is replaced is kept in DIR/quarantine."""
+    from datasets.verify.recipe import restore_recipe
+    from pipelines.stages.repair import repair as repaired
+
+    execution = _execution(engine, workers, ray_address, None, quiet)
+    if restore_recipe(folder):
+        typer.echo(f"{folder / 'recipe.toml'} is the one again that this dataset was made from")
+    with writing(folder) as dataset:
+        aside, left = repaired(dataset, execution)
+    for path in aside:
+        typer.echo(f"put aside: {path}")
+    if left:
+        raise UserError("\nerror: ".join(item.text for item in left))
+    typer.echo(f"{folder} is sound")
+
+
 def report(folder: o.Folder) -> None:
     """Write report.html, and the manifest of what parts of a run have made."""
     dataset = opened(folder)

@@ -41,6 +41,7 @@ class Execution:
     engine: Engine
     console: Console
     part: Part = WHOLE
+    lists: bool = True  # whether each stage writes the manifest at its end
 
 
 class _Rate(ProgressColumn):
@@ -63,7 +64,7 @@ def run_missing(stage: Stage[Shard], dataset: Dataset, shards: Sequence[Shard], 
     else:
         told = f"all {len(shards)} shards are there{stage.hint}" if shards else "no shard is in this part"
         execution.console.print(f"{stage.name}: {told}")
-    if execution.part.is_whole:
+    if execution.part.is_whole and execution.lists:
         dataset.write_manifest()
     return [note for note in map(notes.get, shards) if note]
 
