@@ -8,6 +8,7 @@ from pathlib import Path
 from datasets.store.refusals import refused
 
 QUARANTINE = "quarantine"  # the folder, with the dataset's folders in it
+FAILED = "failed"  # in it the folder of reasons why shards could not be made
 
 
 def put_aside(root: Path, path: Path) -> Path:

@@ -10,7 +10,7 @@ from rich.console import Console
 
 from datasets.errors import UserError
 from pipelines.commands import options as o
-from pipelines.commands.opening import begin, complete_manifest, opened, writing
+from pipelines.commands.opening import begin, complete_manifest, finish, opened, writing
 from pipelines.engines.choice import engine_of
 from pipelines.stages.part import part_of
 
@@ -54,6 +54,7 @@ def run(
         if any(name in OWN_SYSTEMS for name in systems):
             stages.run_bound(dataset, execution)
         stages.run_score(dataset, execution)
+        finish(execution)
         part = execution.part
         if part.is_whole:
             _report(dataset)
@@ -95,6 +96,7 @@ def generate(
     shared, console = not execution.part.is_whole, execution.console
     with begin(recipe, out, regime, reuse, console, shared=shared, keep_masters=not no_masters) as dataset:
         stages.run_generate(dataset, execution)
+        finish(execution)
 
 
 def detect(
@@ -112,6 +114,7 @@ def detect(
     execution = _execution(engine, workers, ray_address, shard, quiet)
     with writing(folder, shared=not execution.part.is_whole) as dataset:
         stages.run_detect(dataset, execution, detector)
+        finish(execution)
 
 
 def estimate(
@@ -140,11 +143,13 @@ def estimate(
     if estimator is None:
         with writing(folder, shared=not execution.part.is_whole) as dataset:
             stages.run_estimate(dataset, [setting], execution, overwrite=overwrite)
+            finish(execution)
         return
     if solver is not None or setting != Setting(camera=camera):
         raise UserError("--estimator is given images: leave out --solver and the options that choose points")
     with writing(folder, shared=not execution.part.is_whole) as dataset:
         stages.run_system(dataset, System(estimator, camera), execution, overwrite=overwrite)
+        finish(execution)
 
 
 def score(
@@ -173,6 +178,7 @@ def score(
         if poses is not None and name is not None:
             stages.run_import(dataset, poses, System(name, camera), execution)
         stages.run_score(dataset, execution)
+        finish(execution)
 
 
 def bound(
@@ -189,6 +195,7 @@ def bound(
     execution = _execution(engine, workers, ray_address, shard, quiet)
     with writing(folder, shared=not execution.part.is_whole) as dataset:
         stages.run_bound(dataset, execution)
+        finish(execution)
 
 
 def repair(
@@ -207,6 +214,7 @@ def repair(
         typer.echo(f"{folder / 'recipe.toml'} is the one again that this dataset was made from")
     with writing(folder) as dataset:
         aside, left = repaired(dataset, execution)
+        finish(execution)
     for path in aside:
         typer.echo(f"put aside: {path}")
     if left:
@@ -239,7 +247,7 @@ def _execution(engine: str, workers: int, ray_address: str | None, shard: str | 
     from pipelines.stages.missing import Execution
 
     part = part_of(shard)
-    return Execution(engine_of(engine, workers, ray_address), Console(quiet=quiet), part)
+    return Execution(engine_of(engine, workers, ray_address), Console(quiet=quiet), part, goes_on=True)
 
 
 def _report(dataset: Dataset) -> None:

@@ -110,7 +110,7 @@ def run_score(dataset: Dataset, execution: Execution) -> None:
     """
     indices = _indices(dataset, execution)
     shards = score.targets(dataset, indices)
-    if execution.part.is_whole or (indices and not shards):
+    if not execution.failures and (execution.part.is_whole or (indices and not shards)):
         dataset.read("estimates", ["frame_id"])
     run_missing(Stage("score", score.is_done, score.run_shard), dataset, shards, execution)
 
@@ -129,7 +129,7 @@ def _run_answers(stage: Stage[int], dataset: Dataset, name: str, execution: Exec
             score.forget(dataset, path)
             dataset.remove_shard(path)
     notes = run_missing(stage, dataset, indices, execution)
-    _tell_failures(stage.name, dataset, paths, notes)
+    _tell_failures(stage.name, dataset, [path for path in paths if dataset.is_done(path)], notes)
 
 
 def _tell_failures(name: str, dataset: Dataset, paths: Sequence[Path], notes: Sequence[str]) -> None:
