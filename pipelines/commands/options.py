@@ -77,6 +77,9 @@ PosesName = Annotated[str | None, typer.Option("--name", help="Name of the poses
 Overwrite = Annotated[
     bool, typer.Option("--overwrite", help="Estimate anew what is there, as your function has changed.")
 ]
+Timeout = Annotated[
+    float, typer.Option(metavar="SECONDS", help="Time that a function of yours may take for one image.")
+]
 PointsName = Annotated[str, typer.Option("--points", help="detected, truth or truth+noise.")]
 CameraName = Annotated[str, typer.Option("--camera", help="Camera that is assumed: exact, nominal or paper.")]
 Use = Annotated[str, typer.Option("--use", help="Object points: four or all.")]

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import signal
-import sys
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
-from multiprocessing.connection import Connection, wait
-from multiprocessing.context import SpawnProcess
+from multiprocessing.connection import wait
 from typing import Any
 
 from datasets.errors import UserError
+from pipelines.children import Child, start
 from pipelines.engines.engine import FATAL, TRIES, Failure
 from pipelines.engines.worker import serve
-
-HELD_BACK = tuple(getattr(signal, name) for name in ("SIGINT", "SIGHUP", "SIGTERM") if hasattr(signal, name))
-PATIENCE_S = 5.0  # within which a process that was killed ends
 
 
 class LostProcessError(UserError):
@@ -27,8 +21,7 @@ class LostProcessError(UserError):
 
 @dataclass
 class _Worker:
-    process: SpawnProcess
-    pipe: Connection
+    child: Child
     numbered: tuple[int, Any] = (0, None)  # the task with its number
     is_busy: bool = False
 
@@ -61,7 +54,7 @@ def run_in_processes(
                     yield task, None, Failure(error, trace)
     finally:
         for worker in workers:
-            _end(worker)
+            worker.child.kill()
 
 
 def _hand_out(
@@ -73,69 +66,31 @@ def _hand_out(
         if worker is None:
             if len(workers) == count:
                 return
-            worker = _start(run_one)
+            worker = _Worker(start(serve, run_one))
             workers.append(worker)
         worker.numbered, worker.is_busy = waiting.popleft(), True
         with suppress(OSError):  # it has ended: whoever waits for it notices
-            worker.pipe.send(worker.numbered[1])
-
-
-def _start(run_one: Callable[[Any], Any]) -> _Worker:
-    # Mitsuba starts threads, which a forked process would not have: processes are spawned.
-    context = multiprocessing.get_context("spawn")
-    ours, theirs = context.Pipe()
-    process = context.Process(target=serve, args=(theirs, run_one))
-    with _signals_held_back():
-        process.start()
-    theirs.close()
-    return _Worker(process, ours)
-
-
-@contextmanager
-def _signals_held_back() -> Iterator[None]:
-    """A process that is started in the body never gets the signals of a terminal: its parent does, and ends it."""
-    if sys.platform == "win32":
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, HELD_BACK)
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+            worker.child.pipe.send(worker.numbered[1])
 
 
 def _ready(workers: list[_Worker]) -> list[_Worker]:
     """Busy workers that have sent something or have ended; at least one."""
     busy = [worker for worker in workers if worker.is_busy]
-    found = wait([item for worker in busy for item in (worker.pipe, worker.process.sentinel)])
-    return [worker for worker in busy if worker.pipe in found or worker.process.sentinel in found]
+    found = wait([item for worker in busy for item in (worker.child.pipe, worker.child.process.sentinel)])
+    return [worker for worker in busy if worker.child.pipe in found or worker.child.process.sentinel in found]
 
 
 def _received(worker: _Worker, workers: list[_Worker]) -> tuple[Any, BaseException | None, str]:
     """What a worker sends of its task; of one that has ended, how. That one is no longer among the workers."""
     worker.is_busy = False
     try:
-        if worker.pipe.poll():
-            return worker.pipe.recv()
+        if worker.child.pipe.poll():
+            return worker.child.pipe.recv()
     except (EOFError, OSError):
         pass
     workers.remove(worker)
-    _end(worker)
-    return None, LostProcessError(_told(worker.process.exitcode)), ""
-
-
-def _told(code: int | None) -> str:
-    """How a process ended, and what to do."""
-    if code is None or code >= 0:
-        return f"a worker process ended with exit code {code}; run the same command again to go on"
-    name = signal.Signals(-code).name if -code in list(signal.Signals) else f"signal {-code}"
-    if name == "SIGKILL":
-        return "a worker process was killed, often for lack of memory; run again with fewer --workers"
-    return f"a worker process was ended by {name}; run the same command again to go on"
-
-
-def _end(worker: _Worker) -> None:
-    """End a worker: what it was doing is done again, or not wanted."""
-    worker.pipe.close()
-    worker.process.kill()
-    worker.process.join(PATIENCE_S)
+    told, advice = worker.child.end, "run the same command again to go on"
+    if told == "was killed":
+        told, advice = f"{told}, often for lack of memory", "run again with fewer --workers"
+    worker.child.kill()
+    return None, LostProcessError(f"a worker process {told}; {advice}"), ""
