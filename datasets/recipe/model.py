@@ -21,6 +21,7 @@ from datasets.recipe.describe import Key, keys_of, sentence, values_of
 from datasets.recipe.outputs import Outputs
 from datasets.recipe.quality import QUALITIES, QualityName, quality_text
 from datasets.recipe.sensor import sensor_values
+from datasets.recipe.small_text import read_small_text
 from datasets.recipe.targets import DEFAULT_PATTERN, target_values
 from datasets.recipe.world_file import with_world_file
 from datasets.recipe.written_out import written_out
@@ -165,6 +166,8 @@ def parse_recipe(text: str, source: str) -> Recipe:
         return Recipe.model_validate_json(json.dumps(_completed(tomllib.loads(text), source)))
     except UserError:
         raise
+    except RecursionError:
+        raise UserError(f"{source} has lists in lists too deep to be read; a recipe needs three levels") from None
     except tomllib.TOMLDecodeError as error:
         raise UserError(f"{source} is not valid TOML: {error}; mend that line") from None
     except (TypeError, ValueError) as error:
@@ -217,7 +220,7 @@ def load_recipe(name: str) -> tuple[Recipe, str]:
     """
     if name.endswith(SUFFIX) or "/" in name:
         try:
-            text = Path(name).read_text(encoding="utf-8-sig")
+            text = read_small_text(Path(name))
         except (OSError, UnicodeDecodeError) as error:
             reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
             raise UserError(f"cannot read recipe {name}: {reason}; give a .toml file, or one of {_known()}") from None

@@ -50,6 +50,8 @@ def is_done(dataset: Dataset, index: int) -> bool:
 def run_shard(dataset: Dataset, index: int, advance: Callable[[], None] = lambda: None) -> None:
     """Make one shard of `frames` and `keypoints` and its masters, which are removed again if they are not kept.
 
+    What is there of them stays.
+
     advance: called after each frame.
     """
     recipe = dataset.recipe
@@ -57,8 +59,10 @@ def run_shard(dataset: Dataset, index: int, advance: Callable[[], None] = lambda
     visible: list[Mask | None] = []
     rows = list(overlapped(_makers(dataset, chosen, visible), advance))
     truth = pa.concat_tables(_keypoints(recipe, frame, seen) for frame, seen in zip(chosen, visible, strict=True))
-    dataset.write_shard(dataset.shard_path("keypoints", index, count), truth)
-    dataset.write_shard(dataset.shard_path("frames", index, count), pa.Table.from_pylist(rows, schema=FRAMES))
+    for name, made in (("keypoints", truth), ("frames", pa.Table.from_pylist(rows, schema=FRAMES))):
+        path = dataset.shard_path(name, index, count)
+        if not dataset.is_done(path):
+            dataset.write_shard(path, made)
     if not are_kept(dataset.root):
         for frame in chosen:  # of another dataset, put there by `--reuse`
             (dataset.root / linear_path(frame)).unlink(missing_ok=True)
@@ -159,7 +163,8 @@ def _finish(
             write_linear(linear, spec.true_camera(), path, linear_key(recipe, frame))
         if truth is not None:
             path = dataset.root / truth_path(frame)
-            write_truth(truth, recipe.outputs.aovs, path)
+            if not path.is_file():
+                write_truth(truth, recipe.outputs.aovs, path)
     except OSError as error:
         raise refused(path, error) from error
     image = _developed(recipe, frame, linear)
