@@ -147,7 +147,7 @@ def through_pupil(camera, where, region, pupil, side=4, places=300):
 def test_an_open_pupil_is_the_mean_of_rays_cast_one_by_one(camera):
     """A tilted board: its first point is out of focus by 3 px, its last is sharp.
 
-    The fish-eye lens has both at nearly the same distance, so that its pupil is wide and the blur changes over a square.
+    The fish-eye lens has both at nearly the same distance: its pupil is wide, and the blur changes over a square.
     """
     camera = camera.replace(fx=0.5 * camera.fx, fy=0.5 * camera.fy, cx=160.9, cy=119.3, width=320, height=240)
     where = pose(45.0, 900.0 if camera is FISHEYE else 1300.0, PLAIN)
