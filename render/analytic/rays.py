@@ -66,7 +66,8 @@ class DeviceCamera:
         rotation, origin = self._placement(y_px)
         if self.pupil is not None:
             place = pupil_place(in_cam, (self.pupil[0], self.pupil[1]))
-            in_cam = tuple(d - p * self.pupil[2] for d, p in zip(in_cam, place, strict=True))
+            x_cam, y_cam, z_cam = (d - p * self.pupil[2] for d, p in zip(in_cam, place, strict=True))
+            in_cam = (x_cam, y_cam, z_cam)
             moved = _turned(rotation, place)
             origin = [start + way for start, way in zip(origin, (moved.x, moved.y, moved.z), strict=True)]
         direction, along_x, along_y = (_turned(rotation, vector) for vector in (in_cam, per_pixel_x, per_pixel_y))
