@@ -115,4 +115,4 @@ def _row_placements(cam_from_obj: Pose) -> DeviceFloat | None:
         return None
     obj_from_cam = cam_from_obj.at_rows(np.arange(cam_from_obj.height)).inverse()
     table = np.concatenate((obj_from_cam.R.reshape(-1, 9), obj_from_cam.t), axis=1)
-    return backend.load().Float(table.astype(np.float32).ravel())
+    return backend.upload(table.ravel())

@@ -76,7 +76,7 @@ def _row_placements(cam_from_obj: RollingPose, tile: Region, world_from_obj: Arr
     rotation = world_from_obj[:3, :3] @ obj_from_cam.R
     origin = obj_from_cam.t @ world_from_obj[:3, :3].T + world_from_obj[:3, 3]
     table = np.concatenate((rotation.reshape(-1, 9), origin), axis=1)
-    return backend.load().Float(table.astype(np.float32).ravel())
+    return backend.upload(table.ravel())
 
 
 def _description(
