@@ -102,6 +102,16 @@ class Recipe(BaseModel):
                 f"world method is 'hybrid', which bakes light for pattern chessboard only, and the target is "
                 f"{self.target.pattern!r}; set method to path or closed"
             )
+        if self.world.method == "hybrid" and self.optics.pupil:
+            raise ValueError(
+                f"optics aperture_mm is {self.optics.aperture_mm} and world method 'hybrid', which has sharp edges; "
+                "set method to path or closed, or aperture_mm to 0"
+            )
+        if self.optics.is_chromatic and not self.outputs.colour:
+            raise ValueError(
+                f"optics red_focal is {self.optics.red_focal} and blue_focal {self.optics.blue_focal}, which takes "
+                "pictures in colour; set colour = true under [outputs], or both to 1"
+            )
         return self
 
     def sample_count(self) -> int:

@@ -27,10 +27,11 @@ from eposit.arrays import Array, Mask
 from eposit.calibrated_lens import MOST_COEFFICIENTS
 from eposit.pose import tilt_rad
 from pipelines.engines.background import overlapped
-from render.frame import LinearImage, render_world, truth_of
+from render.frame import LinearImage, render_world
+from render.frame_truth import truth_of
 from render.hybrid.bake import BakedLight
 from render.motion import RollingPose, image_points, points_in_cam
-from render.pathtraced.picture import Viewpoint
+from render.pathtraced.tiles import Viewpoint
 from render.sensor.develop import FrameContext, develop
 from render.targets.image_region import Region
 from render.truth.pixels import PixelTruth
@@ -118,7 +119,7 @@ def linear_light(dataset: Dataset, frame: Frame) -> LinearImage:
 
 def _rendered(recipe: Recipe, frame: Frame, root: Path | None = None) -> LinearImage:
     """root: folder of the dataset that keeps the baked light; without one it is kept in memory."""
-    view = Viewpoint(frame.camera.true_camera(), frame.cam_from_obj, frame.render_seed)
+    view = Viewpoint(frame.camera.true_camera(), frame.cam_from_obj, frame.render_seed, recipe.optics)
     scenery = recipe.world, frame.world, recipe.target, recipe.light
     samples, in_colour = recipe.sample_count(), recipe.outputs.colour
     try:

@@ -29,6 +29,7 @@ from render.device import (
 )
 from render.lens_law import DeviceLens, device_lens, incidence_angle
 from render.motion import RollingPose
+from render.pupil import Pupil, pupil_place
 from render.targets.image_region import Region
 
 SENSOR = "eposit_fisheye"
@@ -49,16 +50,20 @@ def sensor_dict(camera: Camera, cam_from_obj: Pose, region: Region, samples: int
     return _description(camera, cam_from_obj, film, samples, np.eye(4))
 
 
-def tile_sensor(camera: Camera, cam_from_obj: Pose, tile: Region, samples: int, world_from_obj: Array) -> Any:
+def tile_sensor(
+    camera: Camera, cam_from_obj: Pose, tile: Region, samples: int, world_from_obj: Array, pupil: Pupil | None = None
+) -> Any:
     """Mitsuba's sensor for a tile of the picture, with a film of the tile's size in RGBA and no crop.
 
-    world_from_obj: (4, 4) from the object frame, mm, to the scene's frame and units.
+    world_from_obj: (4, 4) from the object frame, mm, to the scene's frame and units. pupil: None for a pinhole.
     """
     shifted = camera.replace(cx=camera.cx - tile.x, cy=camera.cy - tile.y, width=tile.width, height=tile.height)
     film = _film(tile.width, tile.height, "rgba")
     sensor = backend.load().load_dict(_description(shifted, cam_from_obj, film, samples, world_from_obj))
     if isinstance(cam_from_obj, RollingPose):
         sensor.rows = _row_placements(cam_from_obj, tile, world_from_obj)
+    if pupil is not None:
+        sensor.open_pupil(pupil)
     return sensor
 
 
@@ -71,7 +76,7 @@ def _row_placements(cam_from_obj: RollingPose, tile: Region, world_from_obj: Arr
     rotation = world_from_obj[:3, :3] @ obj_from_cam.R
     origin = obj_from_cam.t @ world_from_obj[:3, :3].T + world_from_obj[:3, 3]
     table = np.concatenate((rotation.reshape(-1, 9), origin), axis=1)
-    return backend.load().Float(table.astype(np.float32).ravel())
+    return backend.upload(table.ravel())
 
 
 def _description(
@@ -146,6 +151,7 @@ def register_sensor() -> None:
             # Opaque, so that one kernel serves all poses, regions and cameras of a lens.
             dr.make_opaque(self.scale, self.shift, self.rotation, self.origin)
             self.rows: DeviceFloat | None = None  # a placement for each row of the film, under a rolling shutter
+            self.pupil: list[DeviceFloat] | None = None  # radius, mm, and 1 / focus distance
             self.m_needs_sample_2 = True
 
         def sample_ray(
@@ -158,12 +164,21 @@ def register_sensor() -> None:
         ) -> tuple[DeviceRay, DeviceSpectrum]:
             direction, seen = _direction(self.law, sample2 * self.scale + self.shift)
             rotation, origin = self.placement(sample2.y)
+            if self.pupil is not None:
+                disc = mi.warp.square_to_uniform_disk_concentric(sample3) * self.pupil[0]
+                place = mi.Vector3f(*pupil_place((direction.x, direction.y, direction.z), (disc.x, disc.y)))
+                direction, origin = direction - place * self.pupil[1], origin + rotation @ place
             ray = dr.zeros(mi.Ray3f, dr.width(direction))
             ray.o, ray.d, ray.time = mi.Point3f(origin), dr.normalize(rotation @ direction), time
             ray.maxt = dr.select(seen, dr.largest(mi.Float), 0.0)
             # A kernel of its own, so that the large one that traces the rays is compiled once for all lenses.
             dr.eval(ray, seen)
             return ray, dr.select(seen, mi.Spectrum(1.0), mi.Spectrum(0.0))
+
+        def open_pupil(self, pupil: Pupil) -> None:
+            """See through an open pupil from now on."""
+            self.pupil = [dr.opaque(mi.Float, value) for value in (pupil.radius_mm, 1.0 / pupil.focus_mm)]
+            self.m_needs_sample_3 = True
 
         def placement(self, down: DeviceFloat) -> tuple[DeviceMatrix3, DevicePoint3]:
             """Rotation and origin at the time of the row that lies at a height of the film, from 0 to 1."""

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import functools
 import gc
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eposit import Camera, Pose
 from render import backend
 from render.colour import luminance
 from render.light import Light
-from render.pathtraced.tiles import Film, Tracer, trace_region
+from render.pathtraced.tiles import Film, Tracer, Viewpoint, trace_region
 from render.targets.image_region import Region
 from render.targets.kinds import AnyTarget
 from render.world import World, WorldDraw
@@ -23,15 +21,6 @@ CARD = Parts(has_card=True)
 METER_POINTS, METER_RAYS = 32, 16  # points along each side of the card, rays from each
 METER_SEED = 20
 CARD_GAP_MM = 1.0  # between the card and where its rays begin
-
-
-@dataclass(frozen=True, slots=True)
-class Viewpoint:
-    """From where a frame is seen, and the seed of its rays."""
-
-    camera: Camera
-    cam_from_obj: Pose
-    seed: int  # 32 bits
 
 
 def trace_picture(
@@ -49,7 +38,7 @@ def trace_picture(
         return world.path_samples if _overlap(tile, near) else world.background_samples
 
     tracer, gain = prepared(world, draw, target, light)
-    film = trace_region(tracer, view.camera, view.cam_from_obj, region, samples, view.seed)
+    film = trace_region(tracer, view, region, samples)
     film[..., :3] *= np.float32(gain)
     return film
 
