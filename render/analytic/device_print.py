@@ -75,14 +75,14 @@ def device_print(target: Target, light: Light) -> DevicePrint:
         x=_axis(lattice.x_lines, x0, x1, columns),
         y=_axis(lattice.y_lines, y0, y1, rows),
         sheet=_sheet(sheet),
-        cells=mi.Float(_codes(lattice, sheet).ravel()),
+        cells=backend.upload(_codes(lattice, sheet).ravel()),
         row_length=backend.jit().opaque(mi.UInt32, len(lattice.x_lines) + 1),
         square=square,
         least_gap=gap,
         disc_radius=radius,
         white=white,
         black=black,
-        shading=mi.Float(shading.astype(np.float32).ravel()),
+        shading=backend.upload(shading.ravel()),
     )
 
 
@@ -97,7 +97,7 @@ def _axis(lines: Array, low: float, high: float, texels: int) -> DevicePrintAxis
     table[: len(lines)] = lines
     ends = _opaque(low, high)
     last = dr.opaque(mi.UInt32, len(lines) - 1)
-    return DevicePrintAxis(ends[0], ends[1], mi.Float(table), last, _opaque(texels)[0])
+    return DevicePrintAxis(ends[0], ends[1], backend.upload(table), last, _opaque(texels)[0])
 
 
 def _sheet(sheet: Sheet) -> DeviceSheet:

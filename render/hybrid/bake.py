@@ -114,7 +114,7 @@ class Baker:
         seed = dr.opaque(mi.UInt32, (self.seed + 0x9E3779B9 * (purpose + 1)) & 0xFFFFFFFF)
         pixel = place + dr.opaque(mi.UInt32, 2 * first)
         numbers = lattice_numbers(pixel, ray, seed, NUMBERS + 2)
-        x, y, z = (dr.gather(mi.Float, mi.Float(column), texel) for column in points.T)
+        x, y, z = (dr.gather(mi.Float, backend.upload(column), texel) for column in points.T)
         x += (numbers[NUMBERS] - 0.5) * dr.opaque(mi.Float, step[0])
         y += (numbers[NUMBERS + 1] - 0.5) * dr.opaque(mi.Float, step[1])
         front = mi.Vector3f(0.0, 0.0, -1.0)
