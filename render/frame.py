@@ -25,7 +25,6 @@ from render.pathtraced.fisheye import sensor_dict
 from render.pathtraced.picture import Viewpoint, prepared, trace_picture
 from render.pathtraced.scene import reference_scene
 from render.region import Image, target_region
-from render.targets.chessboard import Chessboard
 from render.targets.image_region import Region
 from render.targets.kinds import AnyTarget
 from render.truth.pixels import PixelTruth, pixel_truth
@@ -78,15 +77,13 @@ def render_world(
     it is left out.
 
     Raises:
-        ValueError: the target's image lies outside the picture, no light reaches it, the user's scene cannot be used,
-            or the method is hybrid and the target has no raised circle.
+        ValueError: the target's image lies outside the picture, no light reaches it, or the user's scene cannot be
+            used.
     """
     if world.method == "closed":
         grey = render_frame(target, light, view.camera, view.cam_from_obj, samples=samples)
         return replace(grey, radiance=np.repeat(grey.radiance[..., None], 3, axis=2)) if in_colour else grey
     if world.method == "hybrid":
-        if not isinstance(target, Chessboard):
-            raise ValueError(f"method hybrid bakes light for pattern chessboard only, not {target.pattern!r}; use path")
         baked = baked_light(world, draw, target, light) if baked is None else baked
         return _hybrid(hybrid_scene(world, draw, target, light, baked), view, samples, in_colour)
     near = target_region(target, view.camera, view.cam_from_obj)
