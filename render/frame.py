@@ -26,7 +26,6 @@ from render.pathtraced.scene import reference_scene
 from render.pathtraced.tiles import Viewpoint
 from render.pupil import Pupil
 from render.region import REGION_MARGIN, Image, target_region
-from render.targets.chessboard import Chessboard
 from render.targets.image_region import Region
 from render.targets.kinds import AnyTarget
 from render.world import World, WorldDraw
@@ -76,11 +75,9 @@ def render_world(
 
     Raises:
         ValueError: the target's image lies outside the picture or too far out of focus, no light reaches it, the user's
-            scene cannot be used, the method is hybrid and the target has no raised circle or the lens an open pupil, or
-            colours have focal lengths of their own and the picture is grey.
+            scene cannot be used, the method is hybrid and the lens has an open pupil, or colours have focal lengths of
+            their own and the picture is grey.
     """
-    if world.method == "hybrid" and not isinstance(target, Chessboard):
-        raise ValueError(f"method hybrid bakes light for pattern chessboard only, not {target.pattern!r}; use path")
     if world.method == "hybrid" and view.optics.pupil:
         raise ValueError("method hybrid has sharp edges, which an open pupil blurs by distance; use closed or path")
     scene = _Scene(world, draw, target, light, samples, baked)
@@ -132,7 +129,6 @@ class _Scene:
         return replace(grey, radiance=np.repeat(grey.radiance[..., None], 3, axis=2)) if in_colour else grey
 
     def _hybrid(self, view: Viewpoint, near: Region, in_colour: bool) -> LinearImage:
-        assert isinstance(self.target, Chessboard)
         scenery = self.world, self.draw, self.target, self.light
         scene = hybrid_scene(*scenery, baked_light(*scenery) if self.baked is None else self.baked)
         radiance = scene.region(view.camera, view.cam_from_obj, near, cells=self.samples, seed=view.seed)

@@ -97,10 +97,10 @@ class Recipe(BaseModel):
             raise ValueError(
                 f"four has {len(indices)} points, {len(set(indices))} of them different; give four different ones"
             )
-        if self.world.method == "hybrid" and not isinstance(self.target, Chessboard):
+        if self.world.method == "hybrid" and self.world.surface != "matt" and self.target.sheet.sag_mm:
             raise ValueError(
-                f"world method is 'hybrid', which bakes light for pattern chessboard only, and the target is "
-                f"{self.target.pattern!r}; set method to path or closed"
+                f"world method is 'hybrid', whose shiny layer is flat, surface {self.world.surface!r}, and the target "
+                f"bent by {self.target.sheet.sag_mm:g} mm; set surface to matt, bend_sag_mm to 0, or method to path"
             )
         if self.world.method == "hybrid" and self.optics.pupil:
             raise ValueError(

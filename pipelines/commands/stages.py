@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from datasets.store.dataset import Dataset
     from pipelines.stages.missing import Execution
 
+ROOM = "room"  # folder in the demo's of its board in a room
+
 
 def run(
     recipe: o.RecipeName,
@@ -77,8 +79,10 @@ def demo(
     ray_address: o.RayAddress = None,
     quiet: o.Quiet = False,
 ) -> None:
-    """Run the recipe `demo`: 40 images, five lenses, a report."""
-    run("demo", out, regime=regime, workers=workers, engine=engine, ray_address=ray_address, quiet=quiet)
+    """Run the recipes `demo` and, in its folder, `demo-room`: 50 images, five lenses, one report with both."""
+    for recipe, folder in (("demo", out), ("demo-room", out / ROOM)):
+        run(recipe, folder, regime=regime, workers=workers, engine=engine, ray_address=ray_address, quiet=quiet)
+    _report(opened(out))
 
 
 def generate(

@@ -90,7 +90,7 @@ def integrate_shaded(
     picture = found.radiance + radiance_behind * dr.maximum(seen - found.filled, 0.0)
     edges = dr.select((seen > 0.0) & (seen < 1.0), MANY_EDGES, dr.select(seen > 0.0, found.edges, SMOOTH))
     if divided is not None:
-        edges = dr.select(mi.Bool(divided.ravel()), MANY_EDGES, edges)
+        edges = dr.select(backend.upload(divided.ravel().astype(np.uint32)) != 0, MANY_EDGES, edges)
     dr.eval(picture, edges, seen)
     for kind, cells in ((ONE_EDGE, min(samples, ONE_EDGE_CELLS)), (MANY_EDGES, samples)):
         for pixels in _chunks(edges == kind, max(1, CHUNK // cells)):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import gc
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,7 +53,6 @@ def prepared(world: World, draw: WorldDraw, target: AnyTarget, light: Light) -> 
         ValueError: no light reaches the target, or the user's scene cannot be used.
     """
     prepared.cache_clear()
-    gc.collect()
     gain = metered_gain(world, draw, target, light)
     return tracer_of(world, draw, target, light), gain
 
@@ -96,9 +94,7 @@ def _card_radiance(tracer: Tracer, target: AnyTarget) -> NDArray[np.float32]:
     origins = np.repeat(points[:, :3], METER_RAYS, axis=0)
     sampler = mi.load_dict({"type": "independent", "sample_count": 1})
     sampler.seed(METER_SEED, len(origins))
-    ray = mi.Ray3f(
-        mi.Point3f(*(backend.upload(part) for part in origins.T)), mi.Vector3f(*backend.opaque(*inwards))
-    )
+    ray = mi.Ray3f(mi.Point3f(*(backend.upload(part) for part in origins.T)), mi.Vector3f(*backend.opaque(*inwards)))
     with dr.suspend_grad():
         radiance, _, _ = tracer.integrator.sample(tracer.scene, sampler, mi.RayDifferential3f(ray))
         dr.eval(radiance)

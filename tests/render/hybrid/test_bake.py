@@ -40,7 +40,7 @@ def test_nothing_is_darker_around_the_circle(studio):
     """An average that is too wide would spread the shade under the disc to where it is seen."""
     expected, _ = shading_map(TARGET, LIGHT)
     grid, place = disc_grid(TARGET)
-    x, y, _ = grid.points().T
+    x, y = grid.places().T
     distance = np.hypot(x - TARGET.circle_centre[0], y - TARGET.circle_centre[1]).reshape(grid.rows, grid.columns)
     error = (studio.board.mean(axis=2) / expected - 1.0)[place]
     for low in (30.0, 35.0, 40.0, 50.0):
