@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from eposit.arrays import Array
 from pipelines.detection.erf import GAUSS, decay, signed_share
-from pipelines.detection.kernels import compiled_part, inlined
+from pipelines.detection.kernels import compiled_part
 
 PIXEL = 1.0 / 12.0  # variance of a pixel's area along any direction, px^2
 LEAST_GAUSSIAN = 4e-3  # variance of the gaussian that is left when the pixel's area is taken away, px^2
