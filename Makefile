@@ -21,7 +21,7 @@ $(SETUP): requirements.txt pyproject.toml
 	@$(BIN)/python tools/link.py
 	@touch $@
 
-demo: $(SETUP)  ## 40 rendered frames, poses and out/demo/report.html
+demo: $(SETUP)  ## 40 frames in closed form, 10 in a room, poses and out/demo/report.html
 	$(BIN)/python -m pipelines demo --out out/demo
 
 NIGHTLY := $(BIN)/python -m pipelines nightly

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from datasets.errors import UserError
 from datasets.schema import ESTIMATES
-from datasets.store.images import decode_png
+from datasets.store.images import decode_pixels, decode_png
 from datasets.store.nulls import with_nans
 from eposit import Camera, Pose, Solution, Status
 from eposit.arrays import Array, Mask
@@ -105,15 +105,15 @@ def camera_of(row: dict[str, Any]) -> Camera:
     )
 
 
-def decode_image(image: dict[str, Any], path: Path, frame_id: int) -> NDArray[np.uint8]:
-    """(height, width) grey values of an image of `frames`, of one in colour too.
+def decode_image(image: dict[str, Any], path: Path, frame_id: int, *, in_colour: bool = False) -> NDArray[np.uint8]:
+    """(height, width) grey values of an image of `frames`, of one in colour too; in_colour: its RGB, if it has any.
 
     Raises:
         UserError: not an 8-bit PNG, or too small to hold a board; the message names the shard.
     """
     try:
-        pixels = decode_png(image["bytes"])
-        if min(pixels.shape) < LEAST_SIDE_PX:
+        pixels = (decode_pixels if in_colour else decode_png)(image["bytes"])
+        if min(pixels.shape[:2]) < LEAST_SIDE_PX:
             raise ValueError(f"the image is {pixels.shape[1]} x {pixels.shape[0]} px")
     except ValueError as error:
         raise UserError(f"{path}, frame {frame_id}: {error}; delete it and run the generate stage again") from None

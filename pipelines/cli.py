@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import typer
@@ -13,8 +15,9 @@ import typer.main
 
 from datasets.errors import UserError
 from pipelines.commands import compare, nightly, stages, tools
+from pipelines.endings import UNFINISHED, USER_ERROR, UnfinishedError, say_unexpected
 
-USER_ERROR, INTERRUPTED = 2, 130
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)  # what a disk refuses
 EXAMPLE = "Example: python -m pipelines {}"
 ABOUT = "Rendered images of a chessboard through exact fish-eye cameras, detected, solved and scored against truth."
 
@@ -31,6 +34,7 @@ COMMANDS: tuple[tuple[Callable[..., None], str], ...] = (
     (stages.demo, "demo --out out/demo"),
     (compare.compare, "compare out/before out/after"),
     (tools.verify, "verify out/demo"),
+    (stages.repair, "repair out/demo"),
     (tools.doctor, "doctor"),
     (tools.bench, "bench demo --only render --only solver --out bench.md"),
     (tools.paper, "paper --points-only --out out/paper"),
@@ -86,30 +90,41 @@ app = command_line()
 
 
 def guarded(command: Callable[[], Any]) -> int:
-    """Run a command; an expected error becomes one sentence on stderr and exit code 2."""
+    """Run a command; an error becomes one sentence on stderr and an exit code: 2 for what the user can mend."""
     try:
         command()
     except SystemExit as stop:
         return stop.code if isinstance(stop.code, int) else 1
-    except KeyboardInterrupt:
-        print("stopped; run the same command again to go on", file=sys.stderr)
-        return INTERRUPTED
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except UnfinishedError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return UNFINISHED
     except Exception as error:
-        from render.backend import BackendError
-
-        if isinstance(error, UserError | BackendError):
-            print(f"error: {error}", file=sys.stderr)
-            return USER_ERROR
-        if isinstance(error, PermissionError):
-            print(f"error: cannot use {error.filename}: this user has no permission; ask its owner", file=sys.stderr)
-            return USER_ERROR
-        if isinstance(error, BrokenPipeError):
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            return 0
-        raise
+        told = _told(error)
+        if told is None:
+            return say_unexpected(error)
+        print(f"error: {told}", file=sys.stderr)
+        return USER_ERROR
     return 0
 
 
+def _told(error: Exception) -> str | None:
+    """What a user can mend, as one sentence; None of anything else."""
+    from datasets.store.refusals import refused
+    from render.backend import BackendError
+
+    if isinstance(error, UserError | BackendError):
+        return str(error)
+    if isinstance(error, PermissionError):
+        return f"cannot use {error.filename}: this user has no permission; ask its owner"
+    if isinstance(error, OSError) and error.errno in FULL:
+        return str(refused(Path(error.filename or "a file"), error))
+    if isinstance(error, MemoryError):
+        return f"the memory is not enough ({error}); run again with fewer --workers, or with smaller pictures"
+    return None
+
+
 def main() -> int:
-    """Entry point of `python -m pipelines`."""
+    """The command line in a process that listens to signals, or in that of a test."""
     return guarded(app)

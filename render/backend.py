@@ -120,16 +120,17 @@ def jit() -> Any:  # Any: its stubs give `object` for much that our arrays pass 
 
 
 def upload(values: NDArray[Any]) -> Any:
-    """(n,) numbers as an array of float32 on the device.
+    """(n,) numbers on the device: unsigned integers as 32 bits of them, others as float32.
 
     Dr.Jit reads NumPy's memory in place, and compiles one kernel for memory that is aligned and another one for memory
     that is not, which is chance. So the numbers are copied to where they are aligned.
     """
-    memory = np.empty(4 * len(values) + ALIGNMENT, np.uint8)
+    mi, is_count = load(), values.dtype.kind == "u"
+    memory = np.empty(4 * values.size + ALIGNMENT, np.uint8)
     first = -memory.ctypes.data % ALIGNMENT
-    aligned = memory[first : first + 4 * len(values)].view(np.float32)
+    aligned = memory[first : first + 4 * values.size].view(np.uint32 if is_count else np.float32)
     aligned[:] = values
-    return load().Float(aligned)
+    return mi.UInt32(aligned) if is_count else mi.Float(aligned)
 
 
 def opaque(*values: float) -> list[Any]:

@@ -11,28 +11,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from eposit import Camera, Pose
-from eposit.arrays import Mask
 from render import backend
 from render.analytic.image_circle import lens_coverage
 from render.analytic.integrate import integrate_region
 from render.colour import luminance
 from render.device import DeviceScene
 from render.hybrid.bake import BakedLight
-from render.hybrid.picture import HybridScene
 from render.hybrid.prepare import baked_light, hybrid_scene
 from render.light import Light
+from render.motion import points_in_cam
 from render.pathtraced.fisheye import sensor_dict
-from render.pathtraced.picture import Viewpoint, prepared, trace_picture
+from render.pathtraced.picture import trace_picture
 from render.pathtraced.scene import reference_scene
-from render.region import Image, target_region
-from render.targets.chessboard import Chessboard
+from render.pathtraced.tiles import Viewpoint
+from render.pupil import Pupil
+from render.region import REGION_MARGIN, Image, target_region
 from render.targets.image_region import Region
 from render.targets.kinds import AnyTarget
-from render.truth.pixels import PixelTruth, pixel_truth
-from render.truth.visibility import visible_points
 from render.world import World, WorldDraw
-from render.world.boards import BOARD
-from render.world.compose import Composition
 
 REFERENCE_RAYS = 1 << 24  # in flight while the reference is traced
 
@@ -75,75 +71,85 @@ def render_world(
     """Render one frame of a world in linear light, by the world's method.
 
     samples: of the closed form, as for `render_frame`. baked: the world's light for the method hybrid; baked here if
-    it is left out.
+    it is left out. Colours with focal lengths of their own are rendered one after another.
 
     Raises:
-        ValueError: the target's image lies outside the picture, no light reaches it, the user's scene cannot be used,
-            or the method is hybrid and the target has no raised circle.
+        ValueError: the target's image lies outside the picture or too far out of focus, no light reaches it, the user's
+            scene cannot be used, the method is hybrid and the lens has an open pupil, or colours have focal lengths of
+            their own and the picture is grey.
     """
-    if world.method == "closed":
-        grey = render_frame(target, light, view.camera, view.cam_from_obj, samples=samples)
-        return replace(grey, radiance=np.repeat(grey.radiance[..., None], 3, axis=2)) if in_colour else grey
-    if world.method == "hybrid":
-        if not isinstance(target, Chessboard):
-            raise ValueError(f"method hybrid bakes light for pattern chessboard only, not {target.pattern!r}; use path")
-        baked = baked_light(world, draw, target, light) if baked is None else baked
-        return _hybrid(hybrid_scene(world, draw, target, light, baked), view, samples, in_colour)
-    near = target_region(target, view.camera, view.cam_from_obj)
-    if world.surround == "studio":  # beyond the target there is nothing but the background
-        film = trace_picture(world, draw, target, light, view, near, near)
-        behind = np.maximum(lens_coverage(view.camera)[near.pixels] - film[..., 3], 0.0)
-        radiance = film[..., :3] + (np.float32(light.background) * behind)[..., None]
-        return LinearImage(_grey_or_colour(radiance, in_colour), near, light.background)
-    whole = Region.whole(view.camera.width, view.camera.height)
-    film = trace_picture(world, draw, target, light, view, near, whole)
-    picture = _grey_or_colour(film[..., :3], in_colour)
-    return LinearImage(picture[near.pixels], near, picture)
+    if world.method == "hybrid" and view.optics.pupil:
+        raise ValueError("method hybrid has sharp edges, which an open pupil blurs by distance; use closed or path")
+    scene = _Scene(world, draw, target, light, samples, baked)
+    cameras = view.optics.channel_cameras(view.camera)
+    near = _near(target, view, cameras)
+    if len(cameras) == 1:
+        return scene.picture(view, near, in_colour)
+    if not in_colour:
+        raise ValueError("a focal length for each colour makes pictures in colour only; ask for colour")
+    channels: list[Image] = []
+    for i, camera in enumerate(cameras):
+        picture = scene.picture(replace(view, camera=camera), near, world.method != "closed").full(camera)
+        channels.append(picture[..., i] if picture.ndim == 3 else picture)
+    whole = np.stack(channels, axis=-1)
+    return LinearImage(whole[near.pixels], near, whole)
 
 
-def _hybrid(scene: HybridScene, view: Viewpoint, samples: int, in_colour: bool) -> LinearImage:
-    near = target_region(scene.target, view.camera, view.cam_from_obj)
-    radiance = scene.region(view.camera, view.cam_from_obj, near, cells=samples, seed=view.seed)
-    if scene.empty_radiance is not None:
-        return LinearImage(_grey_or_colour(radiance, in_colour), near, scene.empty_radiance)
-    whole = scene.surroundings(view.camera, view.cam_from_obj, near, seed=view.seed)
-    whole[near.pixels] = radiance
-    picture = _grey_or_colour(whole, in_colour)
-    return LinearImage(picture[near.pixels], near, picture)
+def _near(target: AnyTarget, view: Viewpoint, cameras: list[Camera]) -> Region:
+    """The region that the target can touch in the picture of any of the cameras, with what is out of focus."""
+    margin, pupil = REGION_MARGIN, view.optics.pupil
+    if pupil is not None:
+        outline = points_in_cam(view.camera, view.cam_from_obj, target.outline())
+        margin += int(np.ceil(pupil.blur_radius_px(view.camera, outline)))
+    regions = [target_region(target, camera, view.cam_from_obj, margin) for camera in cameras]
+    low = min(region.x for region in regions), min(region.y for region in regions)
+    right, below = (max(region[i] + region[i + 2] for region in regions) for i in (0, 1))
+    return Region.between(low, (right, below))
 
 
 @dataclass(frozen=True, slots=True)
-class FrameTruth:
-    """Truth of one frame, traced when it is asked for."""
+class _Scene:
+    """What is rendered, whoever sees it."""
 
-    scene: DeviceScene
-    composition: Composition
+    world: World
+    draw: WorldDraw
     target: AnyTarget
-    camera: Camera
-    cam_from_obj: Pose
+    light: Light
+    samples: int  # of the closed form
+    baked: BakedLight | None
 
-    def visible(self) -> Mask:
-        """(n,) whether the camera sees each point of the target."""
-        has_target = BOARD in self.composition.objects
-        place = self.composition.world_from_obj, self.target.points, self.camera, self.cam_from_obj
-        return visible_points(self.scene, *place, has_target=has_target)
+    def picture(self, view: Viewpoint, near: Region, in_colour: bool) -> LinearImage:
+        """By the world's method, all colours alike through the view's camera."""
+        method = {"closed": self._closed, "hybrid": self._hybrid, "path": self._path}[self.world.method]
+        return method(view, near, in_colour)
 
-    def pixels(self) -> PixelTruth:
-        """Depth, range, normal and object of every pixel."""
-        place = self.composition.world_from_obj, self.composition.names, self.camera, self.cam_from_obj
-        return pixel_truth(self.scene, *place)
+    def _closed(self, view: Viewpoint, near: Region, in_colour: bool) -> LinearImage:
+        place = self.target, self.light, view.camera, view.cam_from_obj
+        grey = render_frame(*place, samples=self.samples, region=near, pupil=view.optics.pupil)
+        return replace(grey, radiance=np.repeat(grey.radiance[..., None], 3, axis=2)) if in_colour else grey
 
+    def _hybrid(self, view: Viewpoint, near: Region, in_colour: bool) -> LinearImage:
+        scenery = self.world, self.draw, self.target, self.light
+        scene = hybrid_scene(*scenery, baked_light(*scenery) if self.baked is None else self.baked)
+        radiance = scene.region(view.camera, view.cam_from_obj, near, cells=self.samples, seed=view.seed)
+        if scene.empty_radiance is not None:
+            return LinearImage(_grey_or_colour(radiance, in_colour), near, scene.empty_radiance)
+        whole = scene.surroundings(view.camera, view.cam_from_obj, near, seed=view.seed)
+        whole[near.pixels] = radiance
+        picture = _grey_or_colour(whole, in_colour)
+        return LinearImage(picture[near.pixels], near, picture)
 
-def truth_of(
-    world: World, draw: WorldDraw, target: AnyTarget, light: Light, camera: Camera, cam_from_obj: Pose
-) -> FrameTruth:
-    """The truth of one frame, by rays in the scene that its picture shows.
-
-    Raises:
-        ValueError: no light reaches the target, or the user's file cannot be used.
-    """
-    tracer, _ = prepared(world, draw, target, light)
-    return FrameTruth(tracer.scene, tracer.composition, target, camera, cam_from_obj)
+    def _path(self, view: Viewpoint, near: Region, in_colour: bool) -> LinearImage:
+        scenery = self.world, self.draw, self.target, self.light
+        if self.world.surround == "studio":  # beyond the target there is nothing but the background
+            film = trace_picture(*scenery, view, near, near)
+            behind = np.maximum(lens_coverage(view.camera)[near.pixels] - film[..., 3], 0.0)
+            radiance = film[..., :3] + (np.float32(self.light.background) * behind)[..., None]
+            return LinearImage(_grey_or_colour(radiance, in_colour), near, self.light.background)
+        whole = Region.whole(view.camera.width, view.camera.height)
+        film = trace_picture(*scenery, view, near, whole)
+        picture = _grey_or_colour(film[..., :3], in_colour)
+        return LinearImage(picture[near.pixels], near, picture)
 
 
 def _grey_or_colour(rgb: Image, in_colour: bool) -> Image:
@@ -158,13 +164,18 @@ def render_frame(
     *,
     samples: int,
     region: Region | None = None,
+    pupil: Pupil | None = None,
 ) -> LinearImage:
     """Render one frame in linear light, float32, box filter, by closed forms: without random numbers.
 
     samples: cells of a pixel that edges cross, a square number. region: pixels to render, by default the target's.
+    pupil: None for a pinhole.
+
+    Raises:
+        ValueError: the target is too far out of focus, or its image lies outside the picture.
     """
     region = target_region(target, camera, cam_from_obj) if region is None else region
-    radiance = integrate_region(target, light, camera, cam_from_obj, region, samples)
+    radiance = integrate_region(target, light, camera, cam_from_obj, region, samples, pupil)
     return LinearImage(radiance, region, light.background)
 
 

@@ -60,6 +60,7 @@ def test_every_command_has_help_and_an_example(name):
 LONG = {
     "solve": "half of it is the contract that users read",
     "derivatives": "one pass over the points, with all sums in local variables: a sum in memory would wait for it",
+    "register_sensor": "defines a class inside it: its base is there only once Mitsuba's variant is set",
 }
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import pyarrow as pa
 import pytest
 
+from datasets.store.dataset import open_dataset
 from datasets.store.shard_file import DIGEST_KEY, PLACE_KEY, RECIPE_KEY, VERSION_KEY, read_rows, write_rows
 
 
@@ -34,6 +35,8 @@ class Place:
         shutil.copytree(self.source, root)
         for name in without:
             shutil.rmtree(root / name)
+        if without:
+            open_dataset(root).write_manifest()
         return root
 
     def new(self):

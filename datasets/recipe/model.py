@@ -21,6 +21,7 @@ from datasets.recipe.describe import Key, keys_of, sentence, values_of
 from datasets.recipe.outputs import Outputs
 from datasets.recipe.quality import QUALITIES, QualityName, quality_text
 from datasets.recipe.sensor import sensor_values
+from datasets.recipe.small_text import read_small_text
 from datasets.recipe.targets import DEFAULT_PATTERN, target_values
 from datasets.recipe.world_file import with_world_file
 from datasets.recipe.written_out import written_out
@@ -96,10 +97,20 @@ class Recipe(BaseModel):
             raise ValueError(
                 f"four has {len(indices)} points, {len(set(indices))} of them different; give four different ones"
             )
-        if self.world.method == "hybrid" and not isinstance(self.target, Chessboard):
+        if self.world.method == "hybrid" and self.world.surface != "matt" and self.target.sheet.sag_mm:
             raise ValueError(
-                f"world method is 'hybrid', which bakes light for pattern chessboard only, and the target is "
-                f"{self.target.pattern!r}; set method to path or closed"
+                f"world method is 'hybrid', whose shiny layer is flat, surface {self.world.surface!r}, and the target "
+                f"bent by {self.target.sheet.sag_mm:g} mm; set surface to matt, bend_sag_mm to 0, or method to path"
+            )
+        if self.world.method == "hybrid" and self.optics.pupil:
+            raise ValueError(
+                f"optics aperture_mm is {self.optics.aperture_mm} and world method 'hybrid', which has sharp edges; "
+                "set method to path or closed, or aperture_mm to 0"
+            )
+        if self.optics.is_chromatic and not self.outputs.colour:
+            raise ValueError(
+                f"optics red_focal is {self.optics.red_focal} and blue_focal {self.optics.blue_focal}, which takes "
+                "pictures in colour; set colour = true under [outputs], or both to 1"
             )
         return self
 
@@ -165,6 +176,8 @@ def parse_recipe(text: str, source: str) -> Recipe:
         return Recipe.model_validate_json(json.dumps(_completed(tomllib.loads(text), source)))
     except UserError:
         raise
+    except RecursionError:
+        raise UserError(f"{source} has lists in lists too deep to be read; a recipe needs three levels") from None
     except tomllib.TOMLDecodeError as error:
         raise UserError(f"{source} is not valid TOML: {error}; mend that line") from None
     except (TypeError, ValueError) as error:
@@ -217,7 +230,7 @@ def load_recipe(name: str) -> tuple[Recipe, str]:
     """
     if name.endswith(SUFFIX) or "/" in name:
         try:
-            text = Path(name).read_text(encoding="utf-8-sig")
+            text = read_small_text(Path(name))
         except (OSError, UnicodeDecodeError) as error:
             reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
             raise UserError(f"cannot read recipe {name}: {reason}; give a .toml file, or one of {_known()}") from None

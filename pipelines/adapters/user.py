@@ -20,6 +20,8 @@ from eposit.arrays import Array
 from pipelines.adapters.results import PoseResult, Solver, checked, gather, pose_result
 
 NAME = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*(\.[^\W\d]\w*)*")
+SIGMA = "sigma_px"
+SOLVER_FORM = f"(points_in_obj, points_px, camera, *, {SIGMA}=None)"
 ROTATION_TOLERANCE = 1e-5  # of R^T R - 1; what was computed in single precision is off by some 1e-7
 
 
@@ -69,19 +71,23 @@ def user_solver(name: str, tell: Callable[[str], None]) -> Solver:
         UserError: a function that cannot be imported, cannot be called so, or whose result cannot be understood.
     """
     function = load_function(name, "--solver")
-    takes_sigma = check_call(
-        function, f"--solver {name}", "(points_in_obj, points_px, camera, *, sigma_px=None)", 3, "sigma_px"
-    )
+    takes_sigma = check_call(function, f"--solver {name}", SOLVER_FORM, 3, SIGMA)
+
+    def call(*arguments: Any, **extra: Any) -> PoseResult:
+        return attempt(functools.partial(function, *arguments, **extra), f"--solver {name}", tell)
+
+    return as_solver(call, takes_sigma)
+
+
+def as_solver(call: Callable[..., PoseResult], takes_sigma: bool) -> Solver:
+    """What answers for one image, of object points, pixels, camera and perhaps sigma_px, as a solver of many."""
 
     def solve(
         points_in_obj: ArrayLike, points_px: ArrayLike, camera: Camera, /, *, sigma_px: ArrayLike | None = None
     ) -> Solution:
         obj, batch, single = checked(points_in_obj, points_px)
-        extra = {"sigma_px": sigma_px} if takes_sigma else {}
-        answers = [
-            attempt(functools.partial(function, obj.copy(), image.copy(), camera, **extra), f"--solver {name}", tell)
-            for image in batch
-        ]
+        extra = {SIGMA: sigma_px} if takes_sigma else {}
+        answers = [call(obj.copy(), image.copy(), camera, **extra) for image in batch]
         return gather(obj, batch, camera, answers, single)
 
     return solve

@@ -11,9 +11,12 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
+from pipelines.endings import UnfinishedError, own_command
+
 if TYPE_CHECKING:
     from datasets.recipe.model import Recipe
     from datasets.store.dataset import Dataset
+    from pipelines.stages.missing import Execution
 
 
 def load(recipe: str, regime: str | None) -> tuple[Recipe, str]:
@@ -85,6 +88,22 @@ def writing(folder: Path, *, shared: bool = False) -> Iterator[Dataset]:
     _tell_unchecked(folder)
     with hold(folder, shared=shared):
         yield dataset
+
+
+def finish(execution: Execution) -> None:
+    """Refuse to end well where some shards could not be made.
+
+    Raises:
+        UnfinishedError: with the first reason and what to do.
+    """
+    if not execution.failures:
+        return
+    first, count = execution.failures[0], len(execution.failures)
+    more = f", and {count - 1} more" if count > 1 else ""
+    raise UnfinishedError(
+        f"{count} {'shard' if count == 1 else 'shards'} could not be made, each tried twice ({first.reason}{more}; "
+        f"{first.note}); everything else is done, and this tries them again: {own_command()}"
+    )
 
 
 def complete_manifest(dataset: Dataset) -> None:

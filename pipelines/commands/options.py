@@ -31,6 +31,9 @@ Shard = Annotated[
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for machines, instead of text.")]
+Rerender = Annotated[
+    int, typer.Option(min=0, metavar="N", help="Render N frames, spread over the dataset, anew and compare them, too.")
+]
 Regime = Annotated[
     str | None, typer.Option(help="Sensor regime, as if the recipe said so: clean, typical, paper or harsh.")
 ]
@@ -73,6 +76,9 @@ PoseFile = Annotated[
 PosesName = Annotated[str | None, typer.Option("--name", help="Name of the poses of --poses in tables and report.")]
 Overwrite = Annotated[
     bool, typer.Option("--overwrite", help="Estimate anew what is there, as your function has changed.")
+]
+Timeout = Annotated[
+    float, typer.Option(metavar="SECONDS", help="Time that a function of yours may take for one image.")
 ]
 PointsName = Annotated[str, typer.Option("--points", help="detected, truth or truth+noise.")]
 CameraName = Annotated[str, typer.Option("--camera", help="Camera that is assumed: exact, nominal or paper.")]

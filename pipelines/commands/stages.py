@@ -10,13 +10,15 @@ from rich.console import Console
 
 from datasets.errors import UserError
 from pipelines.commands import options as o
-from pipelines.commands.opening import begin, complete_manifest, opened, writing
+from pipelines.commands.opening import begin, complete_manifest, finish, opened, writing
 from pipelines.engines.choice import engine_of
 from pipelines.stages.part import part_of
 
 if TYPE_CHECKING:
     from datasets.store.dataset import Dataset
     from pipelines.stages.missing import Execution
+
+ROOM = "room"  # folder in the demo's of its board in a room
 
 
 def run(
@@ -27,6 +29,7 @@ def run(
     no_masters: o.NoMasters = False,
     solver: o.MoreSolvers = None,
     estimator: o.MoreEstimators = None,
+    timeout: o.Timeout = 300.0,
     workers: o.Workers = 1,
     engine: o.EngineName = "local",
     ray_address: o.RayAddress = None,
@@ -35,14 +38,17 @@ def run(
 ) -> None:
     """Every stage: generate, detect, estimate, score, report; with --estimator photometric the pixels' bound, too."""
     from pipelines.stages import run as stages
-    from pipelines.stages.estimate_images import OWN_SYSTEMS, find_estimator
+    from pipelines.stages.estimate import solver_of
+    from pipelines.stages.estimate_images import OWN_SYSTEMS, estimator_of
     from pipelines.stages.kernels import compiled_ahead
     from pipelines.stages.settings import System, run_settings, settings_of
 
-    execution = _execution(engine, workers, ray_address, shard, quiet)
+    execution = _execution(engine, workers, ray_address, shard, quiet, timeout)
     more, systems = settings_of(solver or []), estimator or []
+    for name in solver or []:
+        solver_of(name, limit_s=timeout)  # what cannot be called is told before anything is rendered
     for name in systems:
-        find_estimator(name)
+        estimator_of(name, timeout)
     shared, console = not execution.part.is_whole, execution.console
     with begin(recipe, out, regime, reuse, console, shared=shared, keep_masters=not no_masters) as dataset:
         with compiled_ahead(dataset, execution.part) as kernels:  # beside the first pictures
@@ -54,6 +60,7 @@ def run(
         if any(name in OWN_SYSTEMS for name in systems):
             stages.run_bound(dataset, execution)
         stages.run_score(dataset, execution)
+        finish(execution)
         part = execution.part
         if part.is_whole:
             _report(dataset)
@@ -72,8 +79,10 @@ def demo(
     ray_address: o.RayAddress = None,
     quiet: o.Quiet = False,
 ) -> None:
-    """Run the recipe `demo`: 40 images, five lenses, a report."""
-    run("demo", out, regime=regime, workers=workers, engine=engine, ray_address=ray_address, quiet=quiet)
+    """Run the recipes `demo` and, in its folder, `demo-room`: 50 images, five lenses, one report with both."""
+    for recipe, folder in (("demo", out), ("demo-room", out / ROOM)):
+        run(recipe, folder, regime=regime, workers=workers, engine=engine, ray_address=ray_address, quiet=quiet)
+    _report(opened(out))
 
 
 def generate(
@@ -95,6 +104,7 @@ def generate(
     shared, console = not execution.part.is_whole, execution.console
     with begin(recipe, out, regime, reuse, console, shared=shared, keep_masters=not no_masters) as dataset:
         stages.run_generate(dataset, execution)
+        finish(execution)
 
 
 def detect(
@@ -112,6 +122,7 @@ def detect(
     execution = _execution(engine, workers, ray_address, shard, quiet)
     with writing(folder, shared=not execution.part.is_whole) as dataset:
         stages.run_detect(dataset, execution, detector)
+        finish(execution)
 
 
 def estimate(
@@ -125,6 +136,7 @@ def estimate(
     draws: o.Draws = 5,
     detector: o.DetectorName = "edge-fit",
     overwrite: o.Overwrite = False,
+    timeout: o.Timeout = 300.0,
     workers: o.Workers = 1,
     engine: o.EngineName = "local",
     ray_address: o.RayAddress = None,
@@ -136,15 +148,17 @@ def estimate(
     from pipelines.stages.settings import Setting, System
 
     setting = Setting("best" if solver is None else solver, points, camera, use, noise_px, draws, detector)
-    execution = _execution(engine, workers, ray_address, shard, quiet)
+    execution = _execution(engine, workers, ray_address, shard, quiet, timeout)
     if estimator is None:
         with writing(folder, shared=not execution.part.is_whole) as dataset:
             stages.run_estimate(dataset, [setting], execution, overwrite=overwrite)
+            finish(execution)
         return
     if solver is not None or setting != Setting(camera=camera):
         raise UserError("--estimator is given images: leave out --solver and the options that choose points")
     with writing(folder, shared=not execution.part.is_whole) as dataset:
         stages.run_system(dataset, System(estimator, camera), execution, overwrite=overwrite)
+        finish(execution)
 
 
 def score(
@@ -173,6 +187,7 @@ def score(
         if poses is not None and name is not None:
             stages.run_import(dataset, poses, System(name, camera), execution)
         stages.run_score(dataset, execution)
+        finish(execution)
 
 
 def bound(
@@ -189,6 +204,31 @@ def bound(
     execution = _execution(engine, workers, ray_address, shard, quiet)
     with writing(folder, shared=not execution.part.is_whole) as dataset:
         stages.run_bound(dataset, execution)
+        finish(execution)
+
+
+def repair(
+    folder: o.Folder,
+    workers: o.Workers = 1,
+    engine: o.EngineName = "local",
+    ray_address: o.RayAddress = None,
+    quiet: o.Quiet = False,
+) -> None:
+    """Make again what is damaged or missing, and nothing else; what is replaced is kept in DIR/quarantine."""
+    from datasets.verify.recipe import restore_recipe
+    from pipelines.stages.repair import repair as repaired
+
+    execution = _execution(engine, workers, ray_address, None, quiet)
+    if restore_recipe(folder):
+        typer.echo(f"{folder / 'recipe.toml'} is the one again that this dataset was made from")
+    with writing(folder) as dataset:
+        aside, left = repaired(dataset, execution)
+        finish(execution)
+    for path in aside:
+        typer.echo(f"put aside: {path}")
+    if left:
+        raise UserError("\nerror: ".join(item.text for item in left))
+    typer.echo(f"{folder} is sound")
 
 
 def report(folder: o.Folder) -> None:
@@ -207,16 +247,22 @@ def frame(folder: o.Folder, frame_id: o.FrameNumber, out: o.Png = Path("frame.pn
     show(remake(recipe, frame_id, f"dataset {folder}"), out, f"frame {frame_id} of {folder}")
 
 
-def _execution(engine: str, workers: int, ray_address: str | None, shard: str | None, quiet: bool) -> Execution:
+def _execution(
+    engine: str, workers: int, ray_address: str | None, shard: str | None, quiet: bool, limit_s: float = 300.0
+) -> Execution:
     """What the options about where and how much mean.
 
     Raises:
-        UserError: a part or an engine that is not usable.
+        UserError: a part, an engine or a time limit that is not usable.
     """
+    from pipelines.adapters.process import check_limit
     from pipelines.stages.missing import Execution
 
+    check_limit(limit_s)
+
     part = part_of(shard)
-    return Execution(engine_of(engine, workers, ray_address), Console(quiet=quiet), part)
+    place = engine_of(engine, workers, ray_address)
+    return Execution(place, Console(quiet=quiet), part, limit_s=limit_s, goes_on=True)
 
 
 def _report(dataset: Dataset) -> None:

@@ -21,15 +21,23 @@ if TYPE_CHECKING:
     from render.targets.kinds import AnyTarget
 
 
-def verify(folder: o.Folder, json: o.Json = False) -> None:
+def verify(folder: o.Folder, rerender: o.Rerender = 0, json: o.Json = False) -> None:
     """Check every file that plan and manifest name, a line for each problem; print the hash of the content."""
     from datasets.store.dataset import open_dataset
     from datasets.verify import verify as check
+    from datasets.verify.recipe import unreadable_recipe
 
-    digest, problems = check(open_dataset(folder))
+    if told := unreadable_recipe(folder):
+        raise UserError(told)
+    dataset = open_dataset(folder)
+    digest, problems = check(dataset)
+    if rerender and not problems:
+        from pipelines.stages.rerender import rerendered_problems
+
+        problems = rerendered_problems(dataset, rerender)
     if json:
-        told = [{"path": str(item.path), "kind": item.kind, "text": item.text} for item in problems]
-        print_json({"content": digest, "problems": told})
+        shown = [{"path": str(item.path), "kind": item.kind, "text": item.text} for item in problems]
+        print_json({"content": digest, "problems": shown})
     elif not problems:
         typer.echo(f"content {digest}")
     if problems:

@@ -17,7 +17,7 @@ START_CORNERS = 16  # that a start is worked out from
 FIT_STEPS = 100
 FREE = np.array([0.0, 2e-2, 100.0, 100.0, 0.3, 0.3, 0.3])  # how far a lens may lie from the start: see `generic_lens`
 HOLD_SHARE = 1e-6  # weight of that against one pixel of one corner: it decides only what nothing else does
-BEND_STEP = 0.05  # squares; second differences at this step are good to 1e-5 px
+FORM_NODES = np.array([-1.0, -0.5, 0.5, 1.0])  # of the reach along a line, where its form is taken
 
 Lift = Callable[[Array], Array]  # (m, 2) places along a bent print to (m, 3) points, both in squares
 
@@ -74,18 +74,26 @@ class BoardMap:
         slope = np.stack((xp - xm, yp - ym), axis=-1) / (2.0 * step)
         return slope[0] if np.ndim(at) == 1 else slope
 
-    def curvatures(self, at: Array, jacobian: Array) -> Array:
-        """(m, 2) curvatures, 1/px, of the images of the lines through (m, 2) points along y and along x.
+    def edge_forms(self, at: Array, jacobian: Array, reach_px: Array) -> Array:
+        """(m, 2, 3) forms of the images of the lines through (m, 2) points along y and along x.
 
-        Each is towards the normal (cos, sin) at the angle that `normal_angles` gives for the line.
+        Each is the coefficients of t^2, t^3 and t^4 of a line's distance from its tangent, px, at t px along it. The
+        distance is towards the normal (c, s) at the angle that `normal_angles` gives, and t along (-s, c).
+
+        reach_px: (m,) how far along the lines the forms are to hold.
         """
-        around = np.concatenate([at + d for d in (*(np.eye(2) * BEND_STEP), *(-np.eye(2) * BEND_STEP), np.zeros(2))])
-        xp, yp, xm, ym, middle = self(around).reshape(5, -1, 2)
+        lengths = np.linalg.norm(jacobian[:, :, ::-1], axis=1)  # of the image of a square along y, along x
+        squares = reach_px[:, None] / lengths
+        lines = np.eye(2)[::-1]
+        away = squares[..., None, None] * FORM_NODES[:, None] * lines[:, None, :]  # (m, 2, 4, 2)
+        seen = self((at[:, None, None] + away).reshape(-1, 2)).reshape(len(at), 2, 4, 2) - self(at)[:, None, None]
         angles = normal_angles(jacobian)
-        bends = np.stack((yp + ym - 2.0 * middle, xp + xm - 2.0 * middle), axis=1) / BEND_STEP**2
         normals = np.stack((np.cos(angles), np.sin(angles)), axis=-1)
-        lengths = np.sum(jacobian[:, :, ::-1] ** 2, axis=1)  # squared length of the image of a square along y, along x
-        return np.sum(bends * normals, axis=-1) / lengths
+        tangents = np.stack((-normals[..., 1], normals[..., 0]), axis=-1)
+        share = np.einsum("mknc,mkc->mkn", seen, tangents) / reach_px[:, None, None]
+        height = np.einsum("mknc,mkc->mkn", seen, normals)
+        powers = share[..., None] ** np.arange(1.0, 5.0)
+        return np.linalg.solve(powers, height[..., None])[..., 1:, 0] / reach_px[:, None, None] ** np.arange(2.0, 5.0)
 
     def slopes(self, at: Array) -> Array:
         """(m, 2, 13) change of the pixels for a change of each of the map's parameters."""

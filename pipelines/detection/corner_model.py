@@ -21,9 +21,11 @@ from pipelines.detection.corner_picture import (
     gather,
     start_levels,
 )  # fmt: skip
-from pipelines.detection.kernels import compiled, inlined
+from pipelines.detection.corner_profiles import EdgeProfile
+from pipelines.detection.kernels import compiled, compiled_part, inlined
 
-BLUR_LIMITS_PX = (0.2, 6.0)
+BLUR_LIMITS_PX = (0.2956, 8.0)  # no picture is sharper than its pixels' own area
+LEAST_NOISE = 0.04  # variance, grey levels^2: half of what rounding to whole grey levels leaves
 FURTHEST_STEP = (0.7, 0.7, 0.15, 0.15, 0.4)  # of the first numbers in one iteration; the others are linear
 LEAST_PIXELS = 24
 
@@ -52,11 +54,14 @@ def fit_corners(image: NDArray[np.uint8], task: CornerTask, steps: int, stop: fl
 
     image: (height, width) 8 bits. stop: step, in standard deviations of what is fitted, at which it has converged.
     """
-    count, most = len(task.starts), (2 * task.window + 1) ** 2
+    count, most = len(task.starts), (2 * int(np.max(task.windows, initial=0)) + 1) ** 2
     fits = CornerFits(
         np.full((count, SHAPE), np.nan), np.full((count, 2, 2), np.nan), np.full(count, np.nan), np.zeros(count, bool)
     )
-    pixels = CornerPixels(np.empty(most), np.empty(most), np.empty(most), np.empty(most), np.empty((SHAPE, most)))
+    first, second = (EdgeProfile(*(np.empty(most) for _ in EdgeProfile._fields)) for _ in range(2))
+    pixels = CornerPixels(
+        np.empty(most), np.empty(most), np.empty(most), np.empty(most), np.empty((SHAPE, most)), first, second
+    )
     system = _System(
         np.empty((SHAPE, SHAPE)), np.empty((SHAPE, SHAPE)), np.empty(SHAPE), np.empty(SHAPE), np.empty(SHAPE)
     )
@@ -75,19 +80,28 @@ def _copy(values: Array, out: Array) -> None:
         out[k] = values[k]
 
 
+@compiled_part
+def _product(first: Array, second: Array, n: int) -> float:
+    """Sum of the products of n numbers, in four sums side by side: one alone would wait for each addition."""
+    a, b, c, d = 0.0, 0.0, 0.0, 0.0
+    whole = n - n % 4
+    for i in range(0, whole, 4):
+        a += first[i] * second[i]
+        b += first[i + 1] * second[i + 1]
+        c += first[i + 2] * second[i + 2]
+        d += first[i + 3] * second[i + 3]
+    for i in range(whole, n):
+        a += first[i] * second[i]
+    return (a + b) + (c + d)
+
+
 @inlined
 def _normal_equations(jacobian: Array, residual: Array, n: int, normal: Array, right: Array) -> None:
     """Lower triangle of J J^T in `normal` and J r in `right`."""
     for a in range(SHAPE):
-        total = 0.0
-        for i in range(n):
-            total += jacobian[a, i] * residual[i]
-        right[a] = total
+        right[a] = _product(jacobian[a], residual, n)
         for b in range(a + 1):
-            total = 0.0
-            for i in range(n):
-                total += jacobian[a, i] * jacobian[b, i]
-            normal[a, b] = total
+            normal[a, b] = _product(jacobian[a], jacobian[b], n)
 
 
 @inlined
@@ -98,15 +112,8 @@ def _noise(jacobian: Array, residual: Array, n: int) -> float:
         weight = jacobian[0, i] ** 2 + jacobian[1, i] ** 2
         square += weight * residual[i] ** 2
         total += weight
-    return square / (total + 1e-300) * n / (n - SHAPE)
-
-
-@inlined
-def _sum_of_squares(values: Array, n: int) -> float:
-    total = 0.0
-    for i in range(n):
-        total += values[i] * values[i]
-    return total
+    noise = square / (total + 1e-300) * n / (n - SHAPE)
+    return noise if noise > LEAST_NOISE else LEAST_NOISE
 
 
 @inlined
@@ -130,6 +137,18 @@ def _move(p: Array, step: Array, right: Array, trial: Array) -> float:
         trial[k] = p[k] + (_clipped(step[k], -FURTHEST_STEP[k], FURTHEST_STEP[k]) if k < MEAN else step[k])
     trial[BLUR] = _clipped(trial[BLUR], BLUR_LIMITS_PX[0], BLUR_LIMITS_PX[1])
     return gain
+
+
+@inlined
+def _hold_blur(p: Array, normal: Array, right: Array) -> None:
+    """Take the blur out of the normal equations where it lies at a limit and would go beyond: the rest goes on."""
+    if (p[BLUR] <= BLUR_LIMITS_PX[0] and right[BLUR] < 0.0) or (p[BLUR] >= BLUR_LIMITS_PX[1] and right[BLUR] > 0.0):
+        right[BLUR] = 0.0
+        for k in range(SHAPE):
+            if k < BLUR:
+                normal[BLUR, k] = 0.0
+            elif k > BLUR:
+                normal[k, BLUR] = 0.0
 
 
 @inlined
@@ -160,33 +179,35 @@ def _fit_all(
     The two loops stay together: with the inner one as a function of its own, inlined or not, the bits and the speed are
     the same, but the first compilation of this module takes 1.2 or 3 s more, to the 4 to 5 s that it takes.
     """
-    starts, shapes, bends = task.starts, task.shapes, task.bends
+    starts, shapes, edges, sharp = task.starts, task.shapes, task.edges, task.sharp
     fitted, covariances, noises, converged = fits
-    _, _, grey, residual, jacobian = pixels
+    grey, residual, jacobian = pixels.grey, pixels.residual, pixels.jacobian
     normal, lower, right, step, trial = system
     for i in range(len(starts)):
         n = gather(image, task, i, pixels)
         if n < LEAST_PIXELS:
             continue
         p = fitted[i]
-        cost, damping, noise = -1.0, 1e-4, 0.0
+        cost, damping, noise, settled = -1.0, 1e-4, 0.0, False
         for count in range(-1 if _begin(shapes[i], trial, p) else 0, steps):
-            draw(trial, n, bends[i, 0], bends[i, 1], pixels)  # the one place: each copy takes seconds to compile
+            draw(trial, n, edges[i], sharp[i], pixels)  # the one place: each copy takes seconds to compile
             if count < 0:
                 start_levels(jacobian[CONTRAST], grey, n, trial)
                 _copy(trial, p)
                 continue
-            new = _sum_of_squares(residual, n)
+            new = _product(residual, residual, n)
             if cost < 0.0 or new <= cost:
                 _copy(trial, p)
+                settled = 0.0 <= cost - new <= stop * stop * noise
                 cost, damping = new, 0.1 * damping
                 _normal_equations(jacobian, residual, n, normal, right)
+                _hold_blur(p, normal, right)
                 noise = _noise(jacobian, residual, n)
             else:
                 damping *= 10.0
             if not solve_damped(normal, right, damping, lower, step):
                 break
-            if _move(p, step, right, trial) <= stop * stop * noise:
+            if settled or _move(p, step, right, trial) <= stop * stop * noise:
                 _copy(trial, p)
                 converged[i] = True
                 break
@@ -201,11 +222,13 @@ def prepare() -> None:
     nothing = CornerTask(
         starts=np.empty((0, 2)),
         shapes=np.empty((0, SHAPE)),
-        bends=np.empty((0, 2)),
+        edges=np.empty((0, 2, 3)),
+        sharp=np.empty(0, bool),
         inverses=np.empty((0, 2, 2)),
         reaches=np.empty((0, 2)),
         clears=np.empty(0),
-        window=1,
+        windows=np.empty(0, np.int64),
+        bands=np.empty(0),
         discs=np.empty((0, 2)),
         disc_axes=np.eye(2),
     )

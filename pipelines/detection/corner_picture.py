@@ -7,8 +7,9 @@ sign(a2 + z2) over two standard normals of correlation r, which to the third ord
     erf(a1 / sqrt 2) erf(a2 / sqrt 2) + r b1 b2 (1 + r a1 a2 / 2 + r^2 (a1^2 - 1) (a2^2 - 1) / 6),
     b = sqrt(2 / pi) exp(-a^2 / 2).
 
-The edges are parabolas whose curvature is given: a lens bends lines, and a straight model would be pulled towards the
-hollow side. The slope of the light shifts the blurred pattern by sigma^2 g.
+The edges are curves whose shape is given: a lens bends lines, and a straight model would be pulled towards the hollow
+side. The slope of the light shifts the blurred pattern by sigma^2 g. Where the picture is so sharp that a pixel's own
+area is most of the blur, the pattern of each edge is averaged over that area (`corner_profiles`).
 
 Source:
     The series is Mehler's expansion of the bivariate normal distribution.
@@ -22,8 +23,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eposit.arrays import Array
-from pipelines.detection.erf import GAUSS, decay, signed_share
+from eposit.arrays import Array, Mask
+from pipelines.detection.corner_profiles import EdgeProfile, box_profile, gaussian_profile, place_edge
 from pipelines.detection.kernels import inlined
 
 # Numbers of a shape, in order: corner x, y, px from the start; directions of the two normals, rad; blur sigma, px;
@@ -37,11 +38,13 @@ class CornerTask(NamedTuple):
 
     starts: Array  # (n, 2) px, where each is looked for
     shapes: Array  # (n, 9) to start from; without a mean grey (NaN), mean and contrast are worked out
-    bends: Array  # (n, 2) curvatures of the edges towards their normals, 1/px
+    edges: Array  # (n, 2, 3) coefficients of t^2, t^3, t^4 of each edge's distance from its tangent, towards its normal
+    sharp: Mask  # (n,) whether a pixel's area is most of the blur
     inverses: Array  # (n, 2, 2) squares per px
     reaches: Array  # (n, 2) squares along both axes that a fit may use
     clears: Array  # (n,) squares; pixels farther than this from both lines see other print
-    window: int  # px, likewise
+    windows: NDArray[np.int64]  # (n,) px, likewise
+    bands: Array  # (n,) px to either side of an edge, likewise
     discs: Array  # (k, 2) centres, px, of ellipses to leave out
     disc_axes: Array  # (2, 2) from px to the unit circle of such an ellipse
 
@@ -54,24 +57,35 @@ class CornerPixels(NamedTuple):
     grey: Array  # (m,)
     residual: Array  # (m,) grey minus model
     jacobian: Array  # (9, m) change of the model for a change of the shape
+    first: EdgeProfile
+    second: EdgeProfile
 
 
 @inlined
 def gather(image: NDArray[np.uint8], task: CornerTask, i: int, pixels: CornerPixels) -> int:
-    """Number of the pixels of corner i: within the window, its reach along both axes, and off the discs."""
-    inverses, reaches, window, discs, disc_axes = task.inverses, task.reaches, task.window, task.discs, task.disc_axes
-    clear = task.clears[i]
+    """Number of the pixels of corner i: within the window, its reach along both axes, beside an edge, off the discs."""
+    inverses, reaches, discs, disc_axes = task.inverses, task.reaches, task.discs, task.disc_axes
+    clear, window, band = task.clears[i], task.windows[i], task.bands[i]
     x, y, grey = pixels.x, pixels.y, pixels.grey
     x0, y0 = task.starts[i, 0], task.starts[i, 1]
+    c1, s1, c2, s2 = (
+        math.cos(task.shapes[i, 2]), math.sin(task.shapes[i, 2]),
+        math.cos(task.shapes[i, 3]), math.sin(task.shapes[i, 3]),
+    )  # fmt: skip
+    bend1, bend2 = task.edges[i, 0, 0], task.edges[i, 1, 0]
     n, left, top = 0, math.floor(x0 + 0.5), math.floor(y0 + 0.5)
     first_row, first_column = (top - window if top > window else 0), (left - window if left > window else 0)
-    for row in range(first_row, top + window + 1):
-        for column in range(first_column, left + window + 1):
-            u, v = column - x0, row - y0
+    last_row, last_column = min(top + window, image.shape[0] - 1), min(left + window, image.shape[1] - 1)
+    for row in range(first_row, last_row + 1):
+        v = row - y0
+        for column in range(first_column, last_column + 1):
+            u = column - x0
+            t1, t2 = c1 * v - s1 * u, c2 * v - s2 * u
+            if abs(c1 * u + s1 * v - bend1 * t1 * t1) > band and abs(c2 * u + s2 * v - bend2 * t2 * t2) > band:
+                continue
             across, down = inverses[i, 0, 0] * u + inverses[i, 0, 1] * v, inverses[i, 1, 0] * u + inverses[i, 1, 1] * v
             far = abs(across) > reaches[i, 0] or abs(down) > reaches[i, 1] or u * u + v * v > window * window
-            far = far or (abs(across) > clear and abs(down) > clear)
-            if far or row >= image.shape[0] or column >= image.shape[1]:
+            if far or (abs(across) > clear and abs(down) > clear):
                 continue
             covered = False
             for k in range(len(discs)):
@@ -86,31 +100,35 @@ def gather(image: NDArray[np.uint8], task: CornerTask, i: int, pixels: CornerPix
 
 
 @inlined
-def draw(p: Array, n: int, bend1: float, bend2: float, pixels: CornerPixels) -> None:
-    """Residual and jacobian of the shape p on n pixels, between edges of two curvatures."""
-    x, y, grey, residual, jacobian = pixels
+def draw(p: Array, n: int, edges: Array, sharp: bool, pixels: CornerPixels) -> None:
+    """Residual and jacobian of the shape p on n pixels, between edges (2, 3) of given form."""
+    x, y, grey, residual, jacobian, one, two = pixels
     c1, s1, c2, s2 = math.cos(p[2]), math.sin(p[2]), math.cos(p[3]), math.sin(p[3])
     x0, y0, sigma, mean, contrast, gx, gy = p[0], p[1], p[4], p[5], p[6], p[7], p[8]
     r, per_sigma, variance = c1 * c2 + s1 * s2, 1.0 / sigma, sigma * sigma
+    shifted = x0 - variance * gx, y0 - variance * gy
+    place_edge(x, y, n, shifted, (c1, s1), sigma, edges[0], one)
+    place_edge(x, y, n, shifted, (c2, s2), sigma, edges[1], two)
+    if sharp:
+        box_profile(n, sigma, (c1, s1), one)
+        box_profile(n, sigma, (c2, s2), two)
+    else:
+        gaussian_profile(n, sigma, one)
+        gaussian_profile(n, sigma, two)
     for i in range(n):
         u, v = x[i] - x0, y[i] - y0
-        us, vs = u + variance * gx, v + variance * gy
-        t1, t2 = c1 * vs - s1 * us, c2 * vs - s2 * us
-        a1 = (c1 * us + s1 * vs - 0.5 * bend1 * (t1 * t1 + variance)) * per_sigma
-        a2 = (c2 * us + s2 * vs - 0.5 * bend2 * (t2 * t2 + variance)) * per_sigma
-        bell1, bell2 = decay(0.5 * a1 * a1), decay(0.5 * a2 * a2)
-        e1, e2 = signed_share(a1, bell1), signed_share(a2, bell2)
-        b1, b2 = GAUSS * bell1, GAUSS * bell2
+        a1, a2, e1, e2 = one.distance[i], two.distance[i], one.sign[i], two.sign[i]
+        b1, b2 = one.slope[i] * sigma, two.slope[i] * sigma
         both = r * b1 * b2
         saddle = e1 * e2 + both * (1.0 + 0.5 * r * a1 * a2 + r * r / 6.0 * (a1 * a1 - 1.0) * (a2 * a2 - 1.0))
         light, level = 1.0 + gx * u + gy * v, mean + contrast * saddle
         lit = contrast * light * per_sigma
         d1, d2 = lit * (b1 * e2 - both * a1), lit * (b2 * e1 - both * a2)  # for a change of the distances
-        jacobian[0, i] = -d1 * (c1 + bend1 * t1 * s1) - d2 * (c2 + bend2 * t2 * s2) - level * gx
-        jacobian[1, i] = -d1 * (s1 - bend1 * t1 * c1) - d2 * (s2 - bend2 * t2 * c2) - level * gy
-        jacobian[2, i] = d1 * t1
-        jacobian[3, i] = d2 * t2
-        jacobian[4, i] = -d1 * a1 - d2 * a2
+        jacobian[0, i] = -d1 * (c1 + one.bend[i] * s1) - d2 * (c2 + two.bend[i] * s2) - level * gx
+        jacobian[1, i] = -d1 * (s1 - one.bend[i] * c1) - d2 * (s2 - two.bend[i] * c2) - level * gy
+        jacobian[2, i] = d1 * one.along[i]
+        jacobian[3, i] = d2 * two.along[i]
+        jacobian[4, i] = lit * (sigma * (one.widening[i] * e2 + two.widening[i] * e1) + both * (a1 * a1 + a2 * a2))
         jacobian[5, i] = light
         jacobian[6, i] = saddle * light
         jacobian[7, i] = level * u

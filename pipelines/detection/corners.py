@@ -10,43 +10,68 @@ from eposit.arrays import Array, Mask
 from pipelines.detection.board_map import BoardMap, normal_angles
 from pipelines.detection.circle_surroundings import ellipses_around_circle
 from pipelines.detection.consistency import Corners, drop_inconsistent
+from pipelines.detection.corner_blur import measured_blur
 from pipelines.detection.corner_model import fit_corners
 from pipelines.detection.corner_picture import BLUR, CONTRAST, MEAN, SHAPE, SLOPE, CornerTask
 from pipelines.detection.corner_sites import CornerSites
 from pipelines.detection.finders import Grey
 
 STOP = 0.5  # step, in standard deviations, at which a fit has converged; it is still made
-START_BLUR_PX = 0.8
 LEAST_CLEAR = 0.5  # of a place's own `clear`, however blurred the print beyond is
 CLEAR_BLURS = 2.6  # blurs to keep between a fit's pixels and the next edge
 START_LIMIT = 0.3  # of the local square: a fit that moves further has gone to another corner
 OWN_NOISE = 0.33  # share of a corner's own noise in what is stated for it; the rest is the board's median
+SURE_NOISE = 0.7  # of a corner's own noise that is stated at least: its pixels tell it to a tenth
+NEAR_PX, NEAR_BLURS = 5, 2.5  # radius of the first window, px and blurs
+FINAL_PX, FARTHEST_PX = 10, 100  # least and largest radius of the final one
+BAND_PX, BAND_BLURS = 1.0, 3.0  # to either side of an edge: pixels farther off tell nothing of its place
+SHARP_PX = 0.6  # blur below which a pixel's area is no gaussian
+FEW = 24  # corners that hardly tell a map's parameters: they are fitted again from the better map
+MISFIT_NOISE = 4.0  # mean squares of a corner's uncertainty that its distance from a good map may have
+FORM_SHARE = 0.4  # of the map's misfit, a square's length along an edge, by which a wrong form moves a corner
 
 
 class _Pass(NamedTuple):
     """Limits of one fit of every corner."""
 
-    window_px: int  # half side of the pixels that it may use
     steps: int
     must_converge: bool
+    reach: float  # squares that the window may reach along the edges; 0 where it is to be small
 
 
-NEAR = _Pass(window_px=5, steps=5, must_converge=False)  # enough for a map to start the final one from
-FINAL = _Pass(window_px=10, steps=12, must_converge=True)
+NEAR = _Pass(steps=8, must_converge=False, reach=0.0)  # enough for a map to start the final one from
+FINAL = _Pass(steps=40, must_converge=True, reach=1.0)
 
 
 def refine_corners(image: Grey, board: BoardMap, sites: CornerSites) -> Corners:
-    """Fit every corner near where `board` puts it, clear of the circle: once near by, then over the whole window."""
+    """Fit every corner near where `board` puts it, clear of the circle: once near by, then over all of its edges."""
     at, size = sites.at, (image.shape[1], image.shape[0])
-    near, found = _fit(image, board, sites, _start_shapes(board, at, START_BLUR_PX), NEAR)
-    good = near.consistent
-    if np.mean(~good) > 0.5:
-        return near
-    board = BoardMap.fit(at, near.points_px, size, good * 1.0, board)
-    shapes = _start_shapes(board, at, near.blur_px)
-    shapes[good, :2] = near.points_px[good] - board(at)[good]
-    shapes[good, MEAN:] = found[good, MEAN:]
-    return drop_inconsistent(_fit(image, board, sites, shapes, FINAL)[0], at, size)
+    corners, shapes = _fit(image, board, sites, _start_shapes(board, at, measured_blur(image, board, sites)), NEAR)
+    for _ in range(2 if len(at) < FEW else 1):
+        good = corners.consistent
+        if np.mean(~good) > 0.5:
+            return corners
+        board = BoardMap.fit(at, corners.points_px, size, good * 1.0, board)
+        limits = FINAL._replace(reach=_form_reach(corners, board, at))
+        corners, shapes = _fit(image, board, sites, _next_shapes(corners, shapes, board, at), limits)
+    return drop_inconsistent(corners, at, size)
+
+
+def _form_reach(corners: Corners, board: BoardMap, at: Array) -> float:
+    """Squares along an edge up to which its form, as the map has it, is good to the corners' uncertainty."""
+    good = corners.consistent
+    misfit = np.median(np.sum((corners.points_px - board(at))[good] ** 2, axis=1))
+    own = np.median(np.trace(corners.covariance_px2[good], axis1=1, axis2=2))
+    excess = max(misfit - MISFIT_NOISE * own, 0.0)
+    return float((own / (FORM_SHARE**2 * excess + 1e-12)) ** 0.25)
+
+
+def _next_shapes(corners: Corners, shapes: Array, board: BoardMap, at: Array) -> Array:
+    """What the next pass starts from."""
+    good, out = corners.consistent, _start_shapes(board, at, corners.blur_px)
+    out[good, :2] = corners.points_px[good] - board(at)[good]
+    out[good, MEAN:] = shapes[good, MEAN:]
+    return out
 
 
 def _start_shapes(board: BoardMap, at: Array, blur_px: float) -> Array:
@@ -63,33 +88,50 @@ def _fit(image: Grey, board: BoardMap, sites: CornerSites, shapes: Array, limits
     """One pass over all corners, and their shapes; consistent is what converged to a corner of the right sense."""
     at = sites.at
     jacobian = board.jacobian(at)
-    task = _task(board, jacobian, sites, shapes, limits.window_px)
+    task = _task(board, jacobian, sites, shapes, limits.reach)
     fitted, covariance, noise, converged = fit_corners(image, task, limits.steps, STOP)
     good = _is_corner(fitted, covariance, task.starts, jacobian, sites)
     good &= converged if limits.must_converge else True
     points = fitted[:, :2]
     if not np.any(good):
         return Corners(points, covariance, good, np.nan, np.nan, board), fitted
-    # A corner's own few pixels tell its noise to a tenth; weights that scatter so much would promise too much.
-    covariance *= (OWN_NOISE * noise + (1.0 - OWN_NOISE) * np.median(noise[good]))[:, None, None]
+    covariance *= _stated_noise(noise, good)[:, None, None]
     blur, contrast = np.median(fitted[good, BLUR]), 2.0 * np.median(np.abs(fitted[good, CONTRAST]))
     return Corners(points, covariance, good, float(blur), float(contrast), board), fitted
 
 
-def _task(board: BoardMap, jacobian: Array, sites: CornerSites, shapes: Array, window: int) -> CornerTask:
+def _stated_noise(noise: Array, good: Mask) -> Array:
+    """(n,) variance of the noise that is stated for each corner, grey levels^2.
+
+    A corner's own few pixels tell its noise to a tenth; weights that scatter so much would promise too much. But where
+    they show far more than the board's, it is what the model does not explain there.
+    """
+    return np.maximum(OWN_NOISE * noise + (1.0 - OWN_NOISE) * np.median(noise[good]), SURE_NOISE * noise)
+
+
+def _task(board: BoardMap, jacobian: Array, sites: CornerSites, shapes: Array, reach: float) -> CornerTask:
     """Where each corner is looked for, and in which pixels: up to the next edges, and not beside the circle."""
     at = sites.at
     lengths = np.linalg.norm(jacobian, axis=1)
     discs, disc_axes = _covered(board, sites)
-    blurs = CLEAR_BLURS * shapes[:, BLUR, None] / lengths
+    blur = shapes[:, BLUR]
+    blurs = CLEAR_BLURS * blur[:, None] / lengths
+    if reach > 0.0:
+        windows = np.clip(min(sites.reach, reach) * lengths.max(axis=1), FINAL_PX, FARTHEST_PX)
+        bands, sharp = BAND_PX + BAND_BLURS * blur, blur < SHARP_PX
+    else:
+        windows = np.maximum(NEAR_PX, NEAR_BLURS * blur)
+        bands, sharp = np.full(len(at), np.inf), np.zeros(len(at), bool)
     return CornerTask(
         starts=board(at),
         shapes=shapes,
-        bends=board.curvatures(at, jacobian),
+        edges=board.edge_forms(at, jacobian, windows),
+        sharp=sharp,
         inverses=np.linalg.inv(jacobian),
         reaches=np.clip(sites.next_edge - blurs, sites.least_reach, sites.reach),
         clears=np.maximum(sites.clear - blurs.max(axis=1), LEAST_CLEAR * sites.clear),
-        window=window,
+        windows=np.ceil(windows).astype(np.int64),
+        bands=bands,
         discs=discs,
         disc_axes=disc_axes,
     )

@@ -3,13 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 from datasets.errors import UserError
+from render.backend import BackendError
 
 MAX_WORKERS = 256
+TRIES = 2  # of a task that fails in a way that nobody expected
+FATAL = (UserError, BackendError, OSError)  # what every task would fail with
 Task = TypeVar("Task")
 Result = TypeVar("Result")
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """Why a task failed each time that it was tried."""
+
+    error: BaseException  # as it was raised, or what ended the task's process
+    trace: str = ""  # of the exception; nothing of a process that ended
+
+    @property
+    def reason(self) -> str:
+        """The error in one line."""
+        text = " ".join(str(self.error).split())
+        return text if isinstance(self.error, UserError) else f"{type(self.error).__name__}: {text}"
 
 
 class Engine(Protocol):
@@ -19,14 +37,21 @@ class Engine(Protocol):
         """Whether `map` would run these tasks in this process, so that they can tell of their progress."""
         ...
 
-    def map(self, run_one: Callable[[Task], Result], tasks: Sequence[Task]) -> Iterator[tuple[Task, Result]]:
+    def map(
+        self,
+        run_one: Callable[[Task], Result],
+        tasks: Sequence[Task],
+        failed: Callable[[Task, Failure], None] | None = None,
+    ) -> Iterator[tuple[Task, Result]]:
         """Run every task at least once, and yield each with its result when it is done, in any order.
 
-        A task may be run again where another machine was lost while it ran, so doing it twice must do no harm.
+        A task may be run again where it failed or its process was lost, so doing it twice must do no harm.
+
+        failed: called for a task that has failed `TRIES` times, and is then left out. Without it such a task ends all.
 
         Raises:
-            UserError: a process that the system killed, or an engine that cannot be reached.
-            Exception: what a task raised; tasks not yet begun are cancelled.
+            UserError: what a task raised so, or an engine that cannot be reached; tasks not yet begun are cancelled.
+            Exception: what a task raised, without `failed`.
         """
         ...
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import multiprocessing
+import traceback
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
+from contextlib import closing
 from dataclasses import dataclass
+from typing import Any
 
-from datasets.errors import UserError
-from pipelines.engines.engine import Result, Task, check_workers
+from pipelines.engines.engine import FATAL, TRIES, Failure, Result, Task, check_workers
+from pipelines.engines.pool import run_in_processes
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,28 +29,35 @@ class LocalEngine:
         """Whether `map` would run these tasks in this process."""
         return self.workers == 1 or len(tasks) < 2
 
-    def map(self, run_one: Callable[[Task], Result], tasks: Sequence[Task]) -> Iterator[tuple[Task, Result]]:
-        """Run every task, and yield each with its result when it is done, in any order.
-
-        Raises:
-            UserError: a worker that the system killed.
-            Exception: what a task raised; tasks not yet begun are cancelled.
-        """
+    def map(
+        self,
+        run_one: Callable[[Task], Result],
+        tasks: Sequence[Task],
+        failed: Callable[[Task, Failure], None] | None = None,
+    ) -> Iterator[tuple[Task, Result]]:
+        """Run every task, and yield each with its result when it is done, in any order; as `Engine.map`."""
         if self.runs_here(tasks):
-            for task in tasks:
-                yield task, run_one(task)
-            return
-        # Mitsuba starts threads, which a forked process would not have: processes are spawned.
-        context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(min(self.workers, len(tasks)), mp_context=context) as pool:
-            futures = {pool.submit(run_one, task): task for task in tasks}
-            try:
-                for future in as_completed(futures):
-                    yield futures[future], future.result()
-            except BrokenProcessPool:
-                raise UserError(
-                    "a worker process was killed, often for lack of memory; run again with fewer --workers"
-                ) from None
-            except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
-                raise
+            outcomes = (_tried(run_one, task) for task in tasks)
+        else:
+            outcomes = run_in_processes(run_one, tasks, min(self.workers, len(tasks)))
+        with closing(outcomes):
+            for task, result, failure in outcomes:
+                if failure is None:
+                    yield task, result
+                elif failed is not None:
+                    failed(task, failure)
+                else:
+                    raise failure.error
+
+
+def _tried(run_one: Callable[[Task], Result], task: Task) -> tuple[Task, Any, Failure | None]:
+    """Run a task in this process, and once more if it fails."""
+    failure = None
+    for _ in range(TRIES):
+        try:
+            return task, run_one(task), None
+        except FATAL:
+            raise
+        except Exception as error:
+            failure = Failure(error, traceback.format_exc())
+    return task, None, failure

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from datasets.errors import UserError
-from pipelines.engines.engine import Result, Task, check_workers
+from pipelines.engines.engine import FATAL, Failure, Result, Task, check_workers
 
 RETRIES = 5  # of a task whose process or node was lost
 CONNECT_S = 10.0
@@ -45,7 +45,12 @@ class RayEngine:
         """Whether `map` would run these tasks in this process: never."""
         return False
 
-    def map(self, run_one: Callable[[Task], Result], tasks: Sequence[Task]) -> Iterator[tuple[Task, Result]]:
+    def map(
+        self,
+        run_one: Callable[[Task], Result],
+        tasks: Sequence[Task],
+        failed: Callable[[Task, Failure], None] | None = None,
+    ) -> Iterator[tuple[Task, Result]]:
         """Run every task, and yield each with its result when it is done, in any order.
 
         Relative paths mean the same on every node: tasks run in the folder of this process.
@@ -63,7 +68,16 @@ class RayEngine:
         try:
             while waiting:
                 (done,), waiting = ray.wait(waiting, num_returns=1)
-                yield references[done], _result(ray, done)
+                try:
+                    result = _result(ray, done)
+                except FATAL:
+                    raise
+                except Exception as error:
+                    if failed is None:
+                        raise
+                    failed(references[done], Failure(error))
+                    continue
+                yield references[done], result
         finally:
             for reference in waiting:
                 ray.cancel(reference)

@@ -22,7 +22,7 @@ REGION = tuple(f"region_{name}_px" for name in Region._fields)
 class Crop:
     """The rendered region of a picture."""
 
-    image: NDArray[np.uint8]  # (h, w)
+    image: NDArray[np.uint8]  # (h, w), or (h, w, 3) RGB
     corner: tuple[int, int]  # x, y in the whole image of its first pixel, px
 
 
@@ -54,6 +54,6 @@ def marks_by_frame(dataset: Dataset, detector: str) -> dict[int, Marks]:
 
 
 def _crop(row: dict[str, Any], path: Path) -> Crop:
-    image = decode_image(row["image"], path, row["frame_id"])
+    image = decode_image(row["image"], path, row["frame_id"], in_colour=True)
     region = Region(*(row[name] for name in REGION))
     return Crop(image[region.pixels], (region.x, region.y))

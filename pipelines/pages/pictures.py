@@ -43,7 +43,9 @@ class Side:
 
     name: str = ""  # empty where there is one side only
     marks: Marks | None = None
-    image: NDArray[np.uint8] | None = None  # (h, w) grey, the part that matters; None: that of the first side
+    image: NDArray[np.uint8] | None = (
+        None  # (h, w) grey or (h, w, 3) RGB, the part that matters; None: that of the first side
+    )
     told: str = ""  # beside what the marks tell
 
 
@@ -104,7 +106,7 @@ def drawn(picture: Picture, longest_px: int = SMALL_PX) -> Drawn:
 def _drawn_side(picture: Picture, side: Side, enlarged: float, longest_px: int) -> DrawnSide:
     marks = "" if side.marks is None else _marks(picture, side.marks, enlarged)
     told = "; ".join(text for text in (side.told, "" if side.marks is None else side.marks.told) if text)
-    return DrawnSide(side.name, told, "" if side.image is None else _address(side.image, longest_px), marks)
+    return DrawnSide(side.name, told, "" if side.image is None else jpeg_address(side.image, longest_px), marks)
 
 
 def _rod(picture: Picture, length: float) -> str:
@@ -114,11 +116,12 @@ def _rod(picture: Picture, length: float) -> str:
     return f'<path class="under" d="{line}"/><path class="rod" d="{line}"/>'
 
 
-def _address(image: NDArray[np.uint8], longest_px: int) -> str:
-    """The image, reduced, as a JPEG in a data address."""
+def jpeg_address(image: NDArray[np.uint8], longest_px: int) -> str:
+    """The image (h, w) or (h, w, 3) RGB, reduced, as a JPEG in a data address."""
     scale = min(1.0, longest_px / max(image.shape))
-    size = [max(1, round(scale * side)) for side in image.shape[::-1]]
-    reduced = cv2.resize(np.ascontiguousarray(image), size, interpolation=cv2.INTER_AREA)
+    size = [max(1, round(scale * side)) for side in image.shape[1::-1]]
+    in_order = image if image.ndim == 2 else image[..., ::-1]  # OpenCV's colours are blue, green, red
+    reduced = cv2.resize(np.ascontiguousarray(in_order), size, interpolation=cv2.INTER_AREA)
     _, data = cv2.imencode(".jpg", reduced, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     return f"data:image/jpeg;base64,{base64.b64encode(data.tobytes()).decode()}"
 

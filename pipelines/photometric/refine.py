@@ -57,8 +57,9 @@ def refine(
     start: at most about a width of the point spread from the true one. start_covariance: (6, 6) of it.
     sigma_px: width of the point spread to start from.
     Status:
-        not_converged: no end within MOST_STEPS. inconsistent: the picture contradicts the model at the end, or the
-        pose has moved farther than its start's covariance allows. no_solution: the pixels do not determine the pose.
+        not_converged: no end within MOST_STEPS. inconsistent: the picture contradicts the model at the end, so much
+        perhaps that the pose is less certain than its start, or the pose has moved farther than its start's covariance
+        allows. no_solution: the pixels do not determine the pose.
     """
     shape = Shape(start, sigma_px)
     steps = 0
@@ -99,7 +100,7 @@ def _judged(shape: Shape, fit: _Fit, start: Pose, start_covariance: Array, steps
     pose, covariance = shape.cam_from_obj, fit.covariance[:POSE, :POSE]
     moved = np.concatenate((rotation_error_vector(pose.R, start.R), pose.t - start.t))
     too_far = _length(moved, start_covariance + covariance) > MOST_MOVED
-    if fit.doubted > MOST_DOUBTED or too_far:
+    if fit.doubted > MOST_DOUBTED or too_far or _relative_variance(covariance, start_covariance) > 1.0:
         return _failed(Status.INCONSISTENT, steps)
     return Refined(Status.OK, shape, covariance, steps)
 
@@ -109,6 +110,13 @@ def _length(change: Array, covariance: Array) -> float:
     scale = np.sqrt(np.diag(covariance)[:POSE])
     whitened = np.linalg.solve(covariance[:POSE, :POSE] / np.outer(scale, scale), change / scale)
     return float(np.sqrt(max(whitened @ (change / scale), 0.0) / POSE))
+
+
+def _relative_variance(covariance: Array, other: Array) -> float:
+    """Mean over six directions of one covariance's variances by those of another one, (6, 6) both."""
+    scale = np.sqrt(np.diag(other))
+    outer = np.outer(scale, scale)
+    return float(np.trace(np.linalg.solve(other / outer, covariance / outer)) / POSE)
 
 
 def _failed(status: Status, steps: int) -> Refined:

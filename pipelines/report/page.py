@@ -17,6 +17,7 @@ from pipelines.report.data import Cell, Series, cells, normalised_rows, series
 from pipelines.report.pixel_bound import bound_rows
 from pipelines.report.points import PointErrors, field_rows, point_errors, tilt_rows
 from pipelines.report.run import Run
+from pipelines.report.scenes import scenes
 from pipelines.report.summary import summarised
 from pipelines.report.tables import bound_table, field_table, normalised_table
 from pipelines.statistics import LEAST_FOR_TAIL
@@ -43,6 +44,7 @@ def write_report(dataset: Dataset) -> Path:
         frames=frames,
         summary=summarised(Run(dataset.recipe, frames, points, found)),
         **_frames(dataset, frames, points, found),
+        scenes=[(scene, scene.link(REPORT)) for scene in scenes(dataset, REPORT)],
         **_detection(points, frames),
         **_poses(found, frames),
         bound=bound_table(bounds) if (bounds := bound_rows(dataset)) else None,

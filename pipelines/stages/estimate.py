@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,9 +18,10 @@ from datasets.schema import FRAMES
 from datasets.store.dataset import Dataset
 from eposit import Solution, Status
 from eposit.arrays import Array, Mask
+from pipelines.adapters.process import LIMIT_S, Form, function_process
 from pipelines.adapters.registry import find_solver, takes_theta_centre
 from pipelines.adapters.results import PoseResult, Solver, gather
-from pipelines.adapters.user import is_given
+from pipelines.adapters.user import SIGMA, SOLVER_FORM, as_solver, is_given
 from pipelines.stages.detect import path_of
 from pipelines.stages.settings import Setting, assumed
 
@@ -30,14 +33,17 @@ def is_done(dataset: Dataset, index: int, setting: Setting) -> bool:
     return dataset.is_done(path_of_shard(dataset, index, setting.name))
 
 
-def run_shard(dataset: Dataset, index: int, setting: Setting) -> str | None:
-    """Make one shard of `estimates`; what a user's function first failed with, if it did."""
+def run_shard(dataset: Dataset, index: int, setting: Setting, limit_s: float = LIMIT_S) -> str | None:
+    """Make one shard of `estimates`; what a user's function first failed with, if it did.
+
+    limit_s: that such a function, which runs in a process of its own, may take for one image.
+    """
+    notes: list[str] = []
+    solver = solver_of(setting.solver, notes.append, limit_s)
     count = shard_count(dataset.recipe)
     columns = [name for name in FRAMES.names if name != "image"]
     frames = dataset.read_shard(dataset.shard_path("frames", index, count), columns).to_pylist()
     target, detected = dataset.recipe.target, setting.points == "detected"
-    notes: list[str] = []
-    solver = find_solver(setting.solver, notes.append)
     path = path_of(dataset, index, setting.detector) if detected else dataset.shard_path("keypoints", index, count)
     rows = dataset.read_shard(path)
     points = points_by_frame(rows, target)
@@ -49,6 +55,20 @@ def run_shard(dataset: Dataset, index: int, setting: Setting) -> str | None:
         notes[before:] = [f"frame {frame_id}: {note}" for note in notes[before:]]
     dataset.write_shard(path_of_shard(dataset, index, setting.name), pa.concat_tables(parts))
     return notes[0] if notes else None
+
+
+def solver_of(name: str, tell: Callable[[str], None] = lambda _: None, limit_s: float = LIMIT_S) -> Solver:
+    """The solver of a name; a user's function in a process of its own.
+
+    tell: called with one line for every image on which a user's function failed.
+
+    Raises:
+        UserError: an unknown name, or a user's function that cannot be imported or called.
+    """
+    if not is_given(name):
+        return find_solver(name)
+    process = function_process(name, Form("--solver", SOLVER_FORM, 3, SIGMA), limit_s)
+    return as_solver(functools.partial(process.call, tell), process.takes_keyword)
 
 
 def path_of_shard(dataset: Dataset, index: int, name: str) -> Path:

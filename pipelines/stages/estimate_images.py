@@ -18,6 +18,7 @@ from datasets.rows import decode_image, estimate_rows
 from datasets.schema import FRAMES
 from datasets.store.dataset import Dataset
 from eposit import Camera
+from pipelines.adapters.process import LIMIT_S, Form, function_process
 from pipelines.adapters.results import PoseResult, stack
 from pipelines.adapters.user import attempt, check_call, load_function
 from pipelines.stages.estimate import path_of_shard
@@ -25,6 +26,8 @@ from pipelines.stages.settings import ALL, IMAGE, System, assumed
 from render.targets.kinds import AnyTarget
 
 OWN_SYSTEMS = {"photometric": "pipelines.photometric:estimate"}  # by the names that tables have
+
+ESTIMATOR_FORM = "(image, camera, target)"
 
 Estimator = Callable[[NDArray[np.uint8], Camera, AnyTarget], Any]
 
@@ -36,7 +39,7 @@ def find_estimator(name: str) -> Estimator:
         UserError: it cannot be imported, or does not take three arguments.
     """
     function = load_function(OWN_SYSTEMS.get(name, name), "--estimator")
-    check_call(function, f"--estimator {name}", "(image, camera, target)", 3)
+    check_call(function, f"--estimator {name}", ESTIMATOR_FORM, 3)
     return function
 
 
@@ -46,13 +49,20 @@ def is_done(dataset: Dataset, index: int, system: System) -> bool:
 
 
 def run_shard(
-    dataset: Dataset, index: int, advance: Callable[[], None] = lambda: None, *, system: System
+    dataset: Dataset,
+    index: int,
+    advance: Callable[[], None] = lambda: None,
+    *,
+    system: System,
+    limit_s: float = LIMIT_S,
 ) -> str | None:
     """Make one shard of `estimates` from the same shard of `frames`; what the function first failed with, if it did.
 
-    The function is called once for each image, (h, w) grey values. advance: called after each frame.
+    The function is called once for each image, (h, w) grey values. advance: called after each frame. limit_s: that a
+    user's function, which runs in a process of its own, may take for one image.
     """
-    function, target = find_estimator(system.name), dataset.recipe.target
+    answer = estimator_of(system.name, limit_s)
+    target = dataset.recipe.target
     path = dataset.shard_path("frames", index, shard_count(dataset.recipe))
     answers: list[PoseResult] = []
     notes: list[str] = []
@@ -60,12 +70,23 @@ def run_shard(
     for frame in frames:
         frame_id = frame["frame_id"]
         image, camera = np.array(decode_image(frame["image"], path, frame_id)), assumed(frame, system.camera)
-        call = functools.partial(function, image, camera, target)
-        answers.append(attempt(call, f"--estimator {system.name}", _named(frame_id, notes)))
+        answers.append(answer(_named(frame_id, notes), image, camera, target))
         advance()
     rows = system_rows([frame["frame_id"] for frame in frames], system, answers)
     dataset.write_shard(path_of_shard(dataset, index, system.shard_name), rows)
     return notes[0] if notes else None
+
+
+def estimator_of(name: str, limit_s: float = LIMIT_S) -> Callable[..., PoseResult]:
+    """What answers for one image, called with where to tell of a failure, image, camera and target.
+
+    Raises:
+        UserError: it cannot be imported, or does not take three arguments.
+    """
+    if name in OWN_SYSTEMS:
+        function = find_estimator(name)
+        return lambda tell, *given: attempt(functools.partial(function, *given), f"--estimator {name}", tell)
+    return function_process(name, Form("--estimator", ESTIMATOR_FORM, 3), limit_s).call
 
 
 def system_rows(frame_ids: Sequence[int], system: System, answers: Sequence[PoseResult]) -> pa.Table:

@@ -27,10 +27,11 @@ from eposit.arrays import Array, Mask
 from eposit.calibrated_lens import MOST_COEFFICIENTS
 from eposit.pose import tilt_rad
 from pipelines.engines.background import overlapped
-from render.frame import LinearImage, render_world, truth_of
+from render.frame import LinearImage, render_world
+from render.frame_truth import truth_of
 from render.hybrid.bake import BakedLight
 from render.motion import RollingPose, image_points, points_in_cam
-from render.pathtraced.picture import Viewpoint
+from render.pathtraced.tiles import Viewpoint
 from render.sensor.develop import FrameContext, develop
 from render.targets.image_region import Region
 from render.truth.pixels import PixelTruth
@@ -50,6 +51,8 @@ def is_done(dataset: Dataset, index: int) -> bool:
 def run_shard(dataset: Dataset, index: int, advance: Callable[[], None] = lambda: None) -> None:
     """Make one shard of `frames` and `keypoints` and its masters, which are removed again if they are not kept.
 
+    What is there of them stays.
+
     advance: called after each frame.
     """
     recipe = dataset.recipe
@@ -57,8 +60,10 @@ def run_shard(dataset: Dataset, index: int, advance: Callable[[], None] = lambda
     visible: list[Mask | None] = []
     rows = list(overlapped(_makers(dataset, chosen, visible), advance))
     truth = pa.concat_tables(_keypoints(recipe, frame, seen) for frame, seen in zip(chosen, visible, strict=True))
-    dataset.write_shard(dataset.shard_path("keypoints", index, count), truth)
-    dataset.write_shard(dataset.shard_path("frames", index, count), pa.Table.from_pylist(rows, schema=FRAMES))
+    for name, made in (("keypoints", truth), ("frames", pa.Table.from_pylist(rows, schema=FRAMES))):
+        path = dataset.shard_path(name, index, count)
+        if not dataset.is_done(path):
+            dataset.write_shard(path, made)
     if not are_kept(dataset.root):
         for frame in chosen:  # of another dataset, put there by `--reuse`
             (dataset.root / linear_path(frame)).unlink(missing_ok=True)
@@ -114,7 +119,7 @@ def linear_light(dataset: Dataset, frame: Frame) -> LinearImage:
 
 def _rendered(recipe: Recipe, frame: Frame, root: Path | None = None) -> LinearImage:
     """root: folder of the dataset that keeps the baked light; without one it is kept in memory."""
-    view = Viewpoint(frame.camera.true_camera(), frame.cam_from_obj, frame.render_seed)
+    view = Viewpoint(frame.camera.true_camera(), frame.cam_from_obj, frame.render_seed, recipe.optics)
     scenery = recipe.world, frame.world, recipe.target, recipe.light
     samples, in_colour = recipe.sample_count(), recipe.outputs.colour
     try:
@@ -159,7 +164,8 @@ def _finish(
             write_linear(linear, spec.true_camera(), path, linear_key(recipe, frame))
         if truth is not None:
             path = dataset.root / truth_path(frame)
-            write_truth(truth, recipe.outputs.aovs, path)
+            if not path.is_file():
+                write_truth(truth, recipe.outputs.aovs, path)
     except OSError as error:
         raise refused(path, error) from error
     image = _developed(recipe, frame, linear)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import re
 from collections.abc import Callable, Collection
 from pathlib import Path
@@ -32,6 +33,8 @@ POSITIONS = (POSITION_COLUMNS, tuple(f"t{axis}" for axis in "xyz"))
 FORM = "frame_id, q_w q_x q_y q_z or r11 to r33, and t_x_mm t_y_mm t_z_mm or tx ty tz in mm"
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,63}")
 NamesAndColumns = tuple[list[str], list[list[Any]]]
+KNOWN = frozenset({FRAME, "status", *QUATERNION_COLUMNS, *MATRIX, *(name for names in POSITIONS for name in names)})
+MOST_ROWS, MOST_BYTES = 2_000_000, 1_000_000_000  # of a file of poses
 TOLERANCE = 1e-3  # of a quaternion's length and of R^T R - 1: three decimals
 
 
@@ -112,13 +115,17 @@ def _columns(path: Path) -> dict[str, list[Any]]:
     read = READERS.get(path.suffix.lower())
     if read is None:
         raise UserError(f"{path} is neither .csv nor .parquet; give --poses one of them")
+    if path.exists() and not path.is_file():
+        raise UserError(f"cannot read {path}: it is no regular file, and may never end; give --poses a file")
+    if path.exists() and path.stat().st_size > MOST_BYTES:
+        raise UserError(f"{path} has more than {MOST_BYTES // 10**6} MB; give --poses a file with a row for each image")
     try:
         header, values = read(path)
     except UnicodeDecodeError:
         raise UserError(f"cannot read {path}: it is not UTF-8 text; give --poses a .csv or .parquet file") from None
     except OSError as error:
         raise UserError(f"cannot read {path}: {error.strerror or 'it is damaged'}; give --poses another file") from None
-    except (pa.ArrowException, csv.Error) as error:
+    except (pa.ArrowException, csv.Error, MemoryError) as error:
         raise UserError(f"cannot read {path}: {_first_line(error)}; give --poses another file") from None
     twice = next((name for i, name in enumerate(header) if name in header[:i]), None)
     if twice is not None:
@@ -127,8 +134,14 @@ def _columns(path: Path) -> dict[str, list[Any]]:
 
 
 def _read_parquet(path: Path) -> NamesAndColumns:
-    table = pq.read_table(path)
-    return table.column_names, [column.to_pylist() for column in table.columns]
+    with pq.ParquetFile(path) as file:
+        _check_rows(path, file.metadata.num_rows)
+        names = [name for name in file.schema_arrow.names if name in KNOWN]
+        table = file.read(names)
+        # Of other columns the names alone are told where one is missing.
+        others = [name for name in file.schema_arrow.names if name not in KNOWN]
+    values = [column.to_pylist() for column in table.columns]
+    return [*table.column_names, *others], [*values, *([] for _ in others)]
 
 
 def _read_csv(path: Path) -> NamesAndColumns:
@@ -139,9 +152,16 @@ def _read_csv(path: Path) -> NamesAndColumns:
     could not say which value of which line is wrong.
     """
     with open(path, encoding="utf-8-sig", newline="") as file:
-        first, *rows = list(csv.reader(file, skipinitialspace=True)) or [[]]
+        lines = csv.reader(file, skipinitialspace=True)
+        first, rows = next(lines, []), list(itertools.islice(lines, MOST_ROWS + 1))
+    _check_rows(path, len(rows))
     header = [name.strip() for name in first]
     return header, _transposed(path, header, rows)
+
+
+def _check_rows(path: Path, count: int) -> None:
+    if count > MOST_ROWS:
+        raise UserError(f"{path} has more than {MOST_ROWS} rows; give --poses a file with a row for each image")
 
 
 READERS: dict[str, Callable[[Path], NamesAndColumns]] = {".parquet": _read_parquet, ".csv": _read_csv}

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import functools
+import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from rich.console import Console
@@ -12,8 +14,11 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColum
 from rich.text import Text
 
 from datasets.plan import frames_of_shard
+from datasets.store.atomic import write_text
 from datasets.store.dataset import Dataset
-from pipelines.engines.engine import Engine
+from datasets.store.quarantine import FAILED, QUARANTINE
+from pipelines.adapters.process import LIMIT_S
+from pipelines.engines.engine import Engine, Failure
 from pipelines.stages.part import WHOLE, Part
 
 Shard = TypeVar("Shard")
@@ -35,12 +40,31 @@ class Stage(Generic[Shard]):
 
 
 @dataclass(frozen=True, slots=True)
+class ShardFailure:
+    """A shard that a stage failed to make, twice."""
+
+    stage: str
+    index: int
+    reason: str
+    note: Path  # file with the reason and, of an exception, where it was raised
+
+
+@dataclass(frozen=True, slots=True)
 class Execution:
     """How stages run: where, what they print to, and what part of a dataset they do."""
 
     engine: Engine
     console: Console
     part: Part = WHOLE
+    lists: bool = True  # whether each stage writes the manifest at its end
+    limit_s: float = LIMIT_S  # for a user's function and one image
+    goes_on: bool = False  # whether a shard that fails twice is left out, and noted, instead of ending all
+    failures: list[ShardFailure] = field(default_factory=list)  # of the shards that could not be made
+
+    def is_left_out(self, dataset: Dataset, shard: Any) -> bool:
+        """Whether a stage before could not make what a shard is made from."""
+        index = dataset.index_of(shard) if isinstance(shard, Path) else shard
+        return any(failure.index == index for failure in self.failures)
 
 
 class _Rate(ProgressColumn):
@@ -56,6 +80,7 @@ def run_missing(stage: Stage[Shard], dataset: Dataset, shards: Sequence[Shard], 
     Only who does everything writes the manifest at the end: of several at once each would list what it has seen of the
     others.
     """
+    shards = [shard for shard in shards if not execution.is_left_out(dataset, shard)]
     missing = [shard for shard in shards if not stage.is_done(dataset, shard)]
     notes: dict[Shard, str | None] = {}
     if missing:
@@ -63,7 +88,7 @@ def run_missing(stage: Stage[Shard], dataset: Dataset, shards: Sequence[Shard], 
     else:
         told = f"all {len(shards)} shards are there{stage.hint}" if shards else "no shard is in this part"
         execution.console.print(f"{stage.name}: {told}")
-    if execution.part.is_whole:
+    if execution.part.is_whole and execution.lists:
         dataset.write_manifest()
     return [note for note in map(notes.get, shards) if note]
 
@@ -81,9 +106,21 @@ def _run_with_bar(
         moves_bar = stage.by_frame and engine.runs_here(missing)
         if moves_bar:
             run_one = functools.partial(run_one, advance=functools.partial(progress.advance, bar))
-        for shard, notes[shard] in engine.map(run_one, missing):
+        failed = functools.partial(_note_failure, stage.name, dataset, execution)
+        for shard, notes[shard] in engine.map(run_one, missing, failed if execution.goes_on else None):
             progress.advance(bar, 0 if moves_bar else steps[shard])
     return notes
+
+
+def _note_failure(stage: str, dataset: Dataset, execution: Execution, shard: Any, failure: Failure) -> None:
+    """Keep why a shard could not be made, in a file of the quarantine; the run goes on without it."""
+    index = dataset.index_of(shard) if isinstance(shard, Path) else shard
+    name = re.sub(r"[^A-Za-z0-9._@+-]", "-", stage)
+    note = dataset.root / QUARANTINE / FAILED / f"{name}-{index:05d}.txt"
+    frames = frames_of_shard(dataset.recipe, index)
+    told = f"{stage}, frames {frames[0].frame_id} to {frames[-1].frame_id}: {failure.reason}"
+    write_text(note, f"{told}\n\n{failure.trace}")
+    execution.failures.append(ShardFailure(stage, index, told, note))
 
 
 def _progress(unit: str, console: Console) -> Progress:

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import functools
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from datasets.plan import frame_count, shard_count
 from datasets.store.dataset import Dataset
 from eposit import Status
-from pipelines.adapters.registry import find_solver
+from pipelines.adapters.process import end_function_process
 from pipelines.detection import Detector
 from pipelines.detection.prepare import Kernels
 from pipelines.stages import bound, detect, estimate, generate, score
 from pipelines.stages import estimate_images as systems
-from pipelines.stages.estimate_images import find_estimator
 from pipelines.stages.import_poses import import_poses
 from pipelines.stages.kernels import compiled_ahead, wait_for
 from pipelines.stages.missing import Execution, Stage, run_missing
@@ -61,27 +60,27 @@ def run_estimate(
         UserError: a user's function that cannot be imported, called or understood.
     """
     for setting in settings:
-        find_solver(setting.solver)
         stage = Stage(
             f"estimate {setting.name}",
             functools.partial(estimate.is_done, setting=setting),
-            functools.partial(estimate.run_shard, setting=setting),
+            functools.partial(estimate.run_shard, setting=setting, limit_s=execution.limit_s),
             hint=MAKE_AGAIN,
         )
-        _run_answers(stage, dataset, setting.name, execution, overwrite=overwrite)
+        check = functools.partial(estimate.solver_of, setting.solver, limit_s=execution.limit_s)
+        _run_answers(stage, dataset, setting.name, execution, check if overwrite else None)
 
 
 def run_system(dataset: Dataset, system: System, execution: Execution, *, overwrite: bool = False) -> None:
     """Give every missing image to a whole system, ours or a user's; `overwrite` and errors as `run_estimate`."""
-    find_estimator(system.name)
     stage = Stage(
         f"estimate {system.shard_name}",
         functools.partial(systems.is_done, system=system),
-        functools.partial(systems.run_shard, system=system),
+        functools.partial(systems.run_shard, system=system, limit_s=execution.limit_s),
         by_frame=True,
         hint=MAKE_AGAIN,
     )
-    _run_answers(stage, dataset, system.shard_name, execution, overwrite=overwrite)
+    check = functools.partial(systems.estimator_of, system.name, execution.limit_s)
+    _run_answers(stage, dataset, system.shard_name, execution, check if overwrite else None)
 
 
 def run_bound(dataset: Dataset, execution: Execution) -> None:
@@ -110,7 +109,7 @@ def run_score(dataset: Dataset, execution: Execution) -> None:
     """
     indices = _indices(dataset, execution)
     shards = score.targets(dataset, indices)
-    if execution.part.is_whole or (indices and not shards):
+    if not execution.failures and (execution.part.is_whole or (indices and not shards)):
         dataset.read("estimates", ["frame_id"])
     run_missing(Stage("score", score.is_done, score.run_shard), dataset, shards, execution)
 
@@ -120,16 +119,25 @@ def _indices(dataset: Dataset, execution: Execution) -> range:
     return execution.part.indices(shard_count(dataset.recipe))
 
 
-def _run_answers(stage: Stage[int], dataset: Dataset, name: str, execution: Execution, *, overwrite: bool) -> None:
-    """Make the shards of estimates that have a name, and tell how often a user's function failed."""
+def _run_answers(
+    stage: Stage[int], dataset: Dataset, name: str, execution: Execution, overwrite: Callable[[], object] | None
+) -> None:
+    """Make the shards of estimates that have a name, and tell how often a user's function failed.
+
+    overwrite: what checks the function before what is there is removed; None leaves what is there.
+    """
     indices = _indices(dataset, execution)
     paths = [estimate.path_of_shard(dataset, index, name) for index in indices]
-    if overwrite:
-        for path in paths:
-            score.forget(dataset, path)
-            dataset.remove_shard(path)
-    notes = run_missing(stage, dataset, indices, execution)
-    _tell_failures(stage.name, dataset, paths, notes)
+    try:
+        if overwrite is not None:
+            overwrite()
+            for path in paths:
+                score.forget(dataset, path)
+                dataset.remove_shard(path)
+        notes = run_missing(stage, dataset, indices, execution)
+    finally:
+        end_function_process()
+    _tell_failures(stage.name, dataset, [path for path in paths if dataset.is_done(path)], notes)
 
 
 def _tell_failures(name: str, dataset: Dataset, paths: Sequence[Path], notes: Sequence[str]) -> None:

@@ -10,7 +10,7 @@ from datasets.errors import UserError
 from datasets.recipe.cameras import assumed_camera
 from datasets.rows import camera_of
 from eposit import Camera
-from pipelines.adapters.registry import check_solver, find_solver, takes_four
+from pipelines.adapters.registry import check_solver, takes_four
 from pipelines.adapters.user import file_name
 from pipelines.detection import Detector, takes_target
 from render.targets.chessboard import Chessboard
@@ -134,13 +134,12 @@ def settings_of(solvers: Iterable[str]) -> list[Setting]:
     """What `run` estimates beside `RUN_SETTINGS` with other solvers: detected and true points.
 
     Raises:
-        UserError: an unknown solver, or a user's function that cannot be imported or called.
+        UserError: an unknown solver.
     """
     settings: list[Setting] = []
     for name in solvers:
         use = "four" if takes_four(name) else "all"
         settings += [Setting(name, use=use), Setting(name, points="truth", use=use)]
-        find_solver(name)
     return settings
 
 

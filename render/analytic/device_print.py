@@ -64,25 +64,36 @@ class DevicePrint:
 @functools.lru_cache(maxsize=4)
 def device_print(target: Target, light: Light) -> DevicePrint:
     """Upload the board and the map of its light, once."""
-    mi = backend.load()
-    lattice, sheet, shading = target.lattice(), target.sheet, sheet_shading_map(target, light)
+    return shaded_print(target, sheet_shading_map(target, light), target.white, target.black)
+
+
+def shaded_print(target: Target, shading: Array, white_reflectance: float, black_reflectance: float) -> DevicePrint:
+    """Upload a board and a map of its light.
+
+    shading: (rows, columns) radiance over reflectance over the sheet's nominal extent, samples at texel centres.
+    """
+    lattice, sheet = target.lattice(), target.sheet
     x0, x1, y0, y1 = sheet.extent_mm
     rows, columns = shading.shape
     square, gap, radius, white, black = _opaque(
-        COARSE * max(x1 - x0, y1 - y0), lattice.least_gap_mm, lattice.disc_radius_mm, target.white, target.black
+        COARSE * max(x1 - x0, y1 - y0),
+        lattice.least_gap_mm,
+        lattice.disc_radius_mm,
+        white_reflectance,
+        black_reflectance,
     )
     return DevicePrint(
         x=_axis(lattice.x_lines, x0, x1, columns),
         y=_axis(lattice.y_lines, y0, y1, rows),
         sheet=_sheet(sheet),
-        cells=mi.Float(_codes(lattice, sheet).ravel()),
-        row_length=backend.jit().opaque(mi.UInt32, len(lattice.x_lines) + 1),
+        cells=backend.upload(_codes(lattice, sheet).ravel()),
+        row_length=backend.jit().opaque(backend.load().UInt32, len(lattice.x_lines) + 1),
         square=square,
         least_gap=gap,
         disc_radius=radius,
         white=white,
         black=black,
-        shading=mi.Float(shading.astype(np.float32).ravel()),
+        shading=backend.upload(shading.ravel()),
     )
 
 
@@ -97,7 +108,7 @@ def _axis(lines: Array, low: float, high: float, texels: int) -> DevicePrintAxis
     table[: len(lines)] = lines
     ends = _opaque(low, high)
     last = dr.opaque(mi.UInt32, len(lines) - 1)
-    return DevicePrintAxis(ends[0], ends[1], mi.Float(table), last, _opaque(texels)[0])
+    return DevicePrintAxis(ends[0], ends[1], backend.upload(table), last, _opaque(texels)[0])
 
 
 def _sheet(sheet: Sheet) -> DeviceSheet:

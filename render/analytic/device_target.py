@@ -5,8 +5,6 @@ from __future__ import annotations
 import functools
 from dataclasses import dataclass
 
-import numpy as np
-
 from eposit.arrays import Array
 from render import backend
 from render.analytic.device_print import DevicePrint, device_print
@@ -79,7 +77,7 @@ def shaded_target(target: Chessboard, shading: Array, disc_shading: float, shado
         white=white,
         black=black,
         disc=DeviceDisc(*opaque(*disc)),
-        shading=mi.Float(shading.astype(np.float32).ravel()),
+        shading=backend.upload(shading.ravel()),
     )
 
 

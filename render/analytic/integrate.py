@@ -25,6 +25,8 @@ from render.analytic.image_circle import device_coverage
 from render.analytic.rays import DeviceCamera, device_camera
 from render.device import DeviceBool, DeviceFloat, DeviceIndex, DeviceInt
 from render.light import Light
+from render.motion import points_in_cam
+from render.pupil import Pupil
 from render.targets.image_region import Region
 from render.targets.kinds import AnyTarget
 
@@ -33,14 +35,35 @@ ONE_EDGE_CELLS = 4  # a single straight edge needs one cell; four follow its ben
 
 
 def integrate_region(
-    target: AnyTarget, light: Light, camera: Camera, cam_from_obj: Pose, region: Region, samples: int
+    target: AnyTarget,
+    light: Light,
+    camera: Camera,
+    cam_from_obj: Pose,
+    region: Region,
+    samples: int,
+    pupil: Pupil | None = None,
 ) -> NDArray[np.float32]:
     """(height, width) mean radiance of the pixels of a region.
 
-    samples: cells of a pixel that several edges cross, a square number.
+    samples: cells of a pixel that several edges cross, a square number. pupil: the mean over its places, each of which
+    sees a sharp picture.
+
+    Raises:
+        ValueError: the target is too far out of focus.
     """
-    scene = device_scene(target, light), device_camera(camera, cam_from_obj)
-    return integrate_shaded(*scene, camera, region, samples, light.background)
+    uploaded = device_scene(target, light)
+
+    def through(place: tuple[float, float, float] | None) -> NDArray[np.float32]:
+        seen = device_camera(camera, cam_from_obj, place)
+        return integrate_shaded(uploaded, seen, camera, region, samples, light.background)
+
+    if pupil is None:
+        return through(None)
+    blur_px = pupil.blur_radius_px(camera, points_in_cam(camera, cam_from_obj, target.outline()))
+    total = np.zeros((region.height, region.width), np.float32)
+    for place, weight in pupil.places(blur_px):
+        total += np.float32(weight) * through((*place, pupil.focus_mm))
+    return total
 
 
 def integrate_shaded(
@@ -67,7 +90,7 @@ def integrate_shaded(
     picture = found.radiance + radiance_behind * dr.maximum(seen - found.filled, 0.0)
     edges = dr.select((seen > 0.0) & (seen < 1.0), MANY_EDGES, dr.select(seen > 0.0, found.edges, SMOOTH))
     if divided is not None:
-        edges = dr.select(mi.Bool(divided.ravel()), MANY_EDGES, edges)
+        edges = dr.select(backend.upload(divided.ravel().astype(np.uint32)) != 0, MANY_EDGES, edges)
     dr.eval(picture, edges, seen)
     for kind, cells in ((ONE_EDGE, min(samples, ONE_EDGE_CELLS)), (MANY_EDGES, samples)):
         for pixels in _chunks(edges == kind, max(1, CHUNK // cells)):

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from eposit import Camera, Pose
 from eposit.arrays import Array
+from render.analytic.device_print import DevicePrint, shaded_print
 from render.analytic.device_target import DeviceTarget, shaded_target
 from render.analytic.integrate import integrate_shaded
 from render.analytic.rays import device_camera
@@ -16,7 +17,9 @@ from render.hybrid.bake import BakedLight
 from render.hybrid.texels import shade_reach
 from render.targets.chessboard import Chessboard
 from render.targets.image_region import Region
+from render.targets.kinds import AnyTarget
 
+Uploaded = DeviceTarget | DevicePrint
 Picture = NDArray[np.float32]  # (height, width) of a region
 
 
@@ -33,34 +36,38 @@ class ClosedLayers:
 class ClosedTarget:
     """The target uploaded several times, each under another light."""
 
-    everything: DeviceTarget  # all of radiance 1
-    disc: DeviceTarget  # the raised circle of radiance 1, the board black
-    channels: tuple[DeviceTarget, ...]  # the board under the baked light, the raised circle black
-    edges: DeviceTarget | None  # the board where shadows' edges are
+    everything: Uploaded  # all of radiance 1
+    disc: Uploaded | None  # the raised circle of radiance 1, the board black; None for a target without one
+    channels: tuple[Uploaded, ...]  # the board under the baked light, the raised circle black
+    edges: Uploaded | None  # the board where shadows' edges are
 
     def layers(self, camera: Camera, cam_from_obj: Pose, region: Region, samples: int) -> ClosedLayers:
         """samples: cells of a pixel that several edges cross, a square number."""
         device = device_camera(camera, cam_from_obj)
 
-        def drawn(target: DeviceTarget, divided: NDArray[np.bool_] | None = None) -> Picture:
+        def drawn(target: Uploaded, divided: NDArray[np.bool_] | None = None) -> Picture:
             return integrate_shaded(target, device, camera, region, samples, 0.0, divided)
 
         divided = None if self.edges is None else drawn(self.edges) > 0.0
         paint = np.stack([drawn(channel, divided) for channel in self.channels], axis=-1)
-        return ClosedLayers(drawn(self.everything), drawn(self.disc), paint)
+        filled = drawn(self.everything)
+        return ClosedLayers(filled, np.zeros_like(filled) if self.disc is None else drawn(self.disc), paint)
 
 
-def closed_target(target: Chessboard, light: BakedLight) -> ClosedTarget:
+def closed_target(target: AnyTarget, light: BakedLight) -> ClosedTarget:
     """Upload the target under its baked light."""
-    even, reach = replace(target, white=1.0, black=1.0, circle=1.0), shade_reach(target)
     ones, zeros = np.ones((2, 2)), np.zeros((2, 2))
-
-    def upload(board: Chessboard, shading: Array, disc: float) -> DeviceTarget:
-        return shaded_target(board, shading, disc, reach)
-
     return ClosedTarget(
-        upload(even, ones, 1.0),
-        upload(even, zeros, 1.0),
-        tuple(upload(target, light.board[..., i], 0.0) for i in range(light.board.shape[-1])),
-        upload(even, light.edges, 0.0) if light.edges.any() else None,
+        _upload(target, ones, 1.0, is_even=True),
+        _upload(target, zeros, 1.0, is_even=True) if isinstance(target, Chessboard) else None,
+        tuple(_upload(target, light.board[..., i], 0.0) for i in range(light.board.shape[-1])),
+        _upload(target, light.edges, 0.0, is_even=True) if light.edges.any() else None,
     )
+
+
+def _upload(target: AnyTarget, shading: Array, disc_shading: float, *, is_even: bool = False) -> Uploaded:
+    """is_even: whether all of it is to have reflectance 1."""
+    if isinstance(target, Chessboard):
+        board = replace(target, white=1.0, black=1.0, circle=1.0) if is_even else target
+        return shaded_target(board, shading, disc_shading, shade_reach(target))
+    return shaded_print(target, shading, *((1.0, 1.0) if is_even else (target.white, target.black)))

@@ -49,10 +49,15 @@ def coat(material: dict[str, Any]) -> Coat:
     """Take a Mitsuba description of a board's surface apart; its paint's reflectance does not matter."""
     mi = backend.load()
     if material["type"] == "diffuse":
-        return Coat(mi.load_dict({"type": "diffuse", "reflectance": WHITE}), None, np.ones(ANGLES))
+        return Coat(matt_white(), None, np.ones(ANGLES))
     paint = mi.load_dict({**material, "diffuse_reflectance": WHITE, "specular_reflectance": NONE})
     gloss = mi.load_dict({**material, "diffuse_reflectance": NONE})
     return Coat(paint, gloss, _transmission(paint))
+
+
+def matt_white() -> Any:
+    """BSDF of white paint without a layer."""
+    return backend.load().load_dict({"type": "diffuse", "reflectance": WHITE})
 
 
 def _transmission(paint: Any) -> Array:

@@ -14,8 +14,8 @@ from render.hybrid.closed_layers import ClosedTarget
 from render.hybrid.coat import Coat
 from render.hybrid.pixel_rays import RayCamera
 from render.hybrid.traced_layers import TracedScene
-from render.targets.chessboard import Chessboard
 from render.targets.image_region import Region
+from render.targets.kinds import AnyTarget
 
 BLOCKED_MARGIN = 2  # px around what stands in front of the target that are path-traced
 BLOCKED_RAYS = 4  # for a pixel, that look for it
@@ -45,7 +45,7 @@ class Rays:
 class HybridScene:
     """All that pictures of one scene share."""
 
-    target: Chessboard
+    target: AnyTarget
     closed: ClosedTarget
     traced: TracedScene
     coat: Coat

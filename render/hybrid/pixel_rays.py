@@ -64,7 +64,7 @@ class RayCamera:
         mi, dr = backend.load(), backend.jit()
         lane = dr.arange(mi.UInt32, len(pixels) * samples)
         place = lane // samples
-        ray, pixel = lane - place * samples, dr.gather(mi.UInt32, mi.UInt32(pixels), place)
+        ray, pixel = lane - place * samples, dr.gather(mi.UInt32, backend.upload(pixels), place)
         key = dr.opaque(mi.UInt32, seed)
         spread = lattice_numbers(pixel, ray, key, 2 + numbers)
         width = dr.opaque(mi.UInt32, self.camera.width)

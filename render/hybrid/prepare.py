@@ -19,6 +19,7 @@ from render.light import Light
 from render.pathtraced.picture import prepared
 from render.pathtraced.tiles import Tracer
 from render.targets.chessboard import Chessboard
+from render.targets.kinds import AnyTarget
 from render.world import World, WorldDraw
 from render.world.boards import target_shapes
 from render.world.compose import load_objects
@@ -26,7 +27,7 @@ from render.world.materials import surface
 
 
 @functools.lru_cache(maxsize=1)
-def baked_light(world: World, draw: WorldDraw, target: Chessboard, light: Light) -> BakedLight:
+def baked_light(world: World, draw: WorldDraw, target: AnyTarget, light: Light) -> BakedLight:
     """Bake the light that a world throws on its target; the same bits for the same values.
 
     Raises:
@@ -35,7 +36,7 @@ def baked_light(world: World, draw: WorldDraw, target: Chessboard, light: Light)
     return baker(world, draw, target, light).bake(target)
 
 
-def baker(world: World, draw: WorldDraw, target: Chessboard, light: Light) -> Baker:
+def baker(world: World, draw: WorldDraw, target: AnyTarget, light: Light) -> Baker:
     """The world's scene, ready for its light to be baked.
 
     Raises:
@@ -53,13 +54,14 @@ def baker(world: World, draw: WorldDraw, target: Chessboard, light: Light) -> Ba
 
 
 @functools.lru_cache(maxsize=1)
-def hybrid_scene(world: World, draw: WorldDraw, target: Chessboard, light: Light, baked: BakedLight) -> HybridScene:
+def hybrid_scene(world: World, draw: WorldDraw, target: AnyTarget, light: Light, baked: BakedLight) -> HybridScene:
     """All that pictures of the world share.
 
     Raises:
         ValueError: no light reaches the target, or the user's scene cannot be used.
     """
     tracer, gain = prepared(world, draw, target, light)
+    circle = target.circle if isinstance(target, Chessboard) else 0.0
     traced = TracedScene(
         scene=tracer.scene,
         target=_target_alone(target),
@@ -73,7 +75,7 @@ def hybrid_scene(world: World, draw: WorldDraw, target: Chessboard, light: Light
         closed=closed_target(target, baked),
         traced=traced,
         coat=_coat(world, draw),
-        disc_radiance=(np.float32(target.circle) * baked.disc).astype(np.float32),
+        disc_radiance=(np.float32(circle) * baked.disc).astype(np.float32),
         rays=Rays(world.layer_samples, world.background_samples, world.path_samples),
         gain=gain,
         has_surroundings=world.surround != "studio" or not world.is_empty,
@@ -81,7 +83,7 @@ def hybrid_scene(world: World, draw: WorldDraw, target: Chessboard, light: Light
 
 
 @functools.lru_cache(maxsize=1)
-def _target_alone(target: Chessboard) -> DeviceScene:
+def _target_alone(target: AnyTarget) -> DeviceScene:
     return load_objects(target_shapes(target, lambda reflectance: surface("matt", 0.0, reflectance)))
 
 

@@ -1,4 +1,4 @@
-"""Grids of texels on the target's plane."""
+"""Grids of texels on the target's sheet."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ import numpy as np
 from eposit.arrays import Array
 from render.light import GRID_SHARE
 from render.targets.chessboard import Chessboard
+from render.targets.kinds import AnyTarget
 
+PRINT_TEXELS = 1200  # of the fine grid along a printed board's longer side
 COARSE_TEXELS = 43200  # of a board, 240 x 180; on the paper's board 5 mm
 LEAST_MAGNIFICATION = 5  # of a coarse texel over a fine one
 NEAR_HEIGHTS = 4.5  # heights of the raised circle around it: lamps beyond 77 degrees from the normal give little light
@@ -18,7 +20,7 @@ FEATHER = 8  # texels over which a finer map takes over from a coarser one
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """Rows and columns of texels; x along columns, y along rows, mm."""
+    """Rows and columns of texels, in the print's nominal lengths; x along columns, y along rows, mm."""
 
     x: float  # of the grid's upper left corner
     y: float
@@ -26,10 +28,10 @@ class Grid:
     columns: int
     rows: int
 
-    def points(self) -> Array:
-        """(rows * columns, 3) centres, row by row."""
+    def places(self) -> Array:
+        """(rows * columns, 2) centres, row by row."""
         x, y = np.meshgrid(self.centres(0), self.centres(1))
-        return np.stack((x.ravel(), y.ravel(), np.zeros(x.size)), axis=1)
+        return np.stack((x.ravel(), y.ravel()), axis=1)
 
     def centres(self, axis: int) -> Array:
         """x of the columns (axis 0) or y of the rows (axis 1)."""
@@ -37,14 +39,15 @@ class Grid:
         return low + (np.arange(count) + 0.5) * self.step[axis]
 
 
-def fine_grid(target: Chessboard) -> Grid:
-    """The texels of `render.light.shading_map`: 1 mm on the paper's board."""
-    spacing = GRID_SHARE * target.square_mm
-    x0, x1, y0, y1 = target.extent_mm
+def fine_grid(target: AnyTarget) -> Grid:
+    """The texels of `render.light.shading_map`, 1 mm on the paper's board; of a printed board as many."""
+    x0, x1, y0, y1 = target.sheet.extent_mm
+    is_chess = isinstance(target, Chessboard)
+    spacing = GRID_SHARE * target.square_mm if is_chess else max(x1 - x0, y1 - y0) / PRINT_TEXELS
     return _over(target, round((x1 - x0) / spacing), round((y1 - y0) / spacing))
 
 
-def coarse_grid(target: Chessboard) -> Grid:
+def coarse_grid(target: AnyTarget) -> Grid:
     """A grid for light without shadows' edges, with a number of texels that does not grow with the board."""
     fine = fine_grid(target)
     factor = max(LEAST_MAGNIFICATION, (fine.columns * fine.rows / COARSE_TEXELS) ** 0.5)
@@ -89,6 +92,6 @@ def paste(values: Array, patch: Array, place: tuple[slice, slice]) -> None:
     values[place] += share * (patch - values[place])
 
 
-def _over(target: Chessboard, columns: int, rows: int) -> Grid:
-    x0, x1, y0, y1 = target.extent_mm
+def _over(target: AnyTarget, columns: int, rows: int) -> Grid:
+    x0, x1, y0, y1 = target.sheet.extent_mm
     return Grid(x0, y0, ((x1 - x0) / columns, (y1 - y0) / rows), columns, rows)

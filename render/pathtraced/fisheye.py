@@ -19,21 +19,19 @@ from render.device import (
     DeviceBool,
     DeviceBox,
     DeviceFloat,
-    DeviceMatrix3,
     DevicePoint2,
-    DevicePoint3,
     DeviceRay,
     DeviceRayDifferential,
     DeviceSpectrum,
-    DeviceVector3,
 )
-from render.lens_law import DeviceLens, device_lens, incidence_angle
+from render.lens_law import device_lens
 from render.motion import RollingPose
+from render.pathtraced.film_rays import FilmRays, row_placements
+from render.pupil import Pupil
 from render.targets.image_region import Region
 
 SENSOR = "eposit_fisheye"
 HALF_PIXEL = 0.5
-ROW_NUMBERS = 12  # nine of a rotation, three of an origin
 CROP = ("offset_x", "offset_y", "width", "height")  # of a film, in the order of a Region
 
 
@@ -49,29 +47,22 @@ def sensor_dict(camera: Camera, cam_from_obj: Pose, region: Region, samples: int
     return _description(camera, cam_from_obj, film, samples, np.eye(4))
 
 
-def tile_sensor(camera: Camera, cam_from_obj: Pose, tile: Region, samples: int, world_from_obj: Array) -> Any:
+def tile_sensor(
+    camera: Camera, cam_from_obj: Pose, tile: Region, samples: int, world_from_obj: Array, pupil: Pupil | None = None
+) -> Any:
     """Mitsuba's sensor for a tile of the picture, with a film of the tile's size in RGBA and no crop.
 
-    world_from_obj: (4, 4) from the object frame, mm, to the scene's frame and units.
+    world_from_obj: (4, 4) from the object frame, mm, to the scene's frame and units. pupil: None for a pinhole.
     """
     shifted = camera.replace(cx=camera.cx - tile.x, cy=camera.cy - tile.y, width=tile.width, height=tile.height)
     film = _film(tile.width, tile.height, "rgba")
     sensor = backend.load().load_dict(_description(shifted, cam_from_obj, film, samples, world_from_obj))
     if isinstance(cam_from_obj, RollingPose):
-        sensor.rows = _row_placements(cam_from_obj, tile, world_from_obj)
+        sensor.film_rays.rows = row_placements(cam_from_obj, tile, world_from_obj)
+    if pupil is not None:
+        sensor.film_rays.open_pupil(pupil)
+        sensor.m_needs_sample_3 = True
     return sensor
-
-
-def _row_placements(cam_from_obj: RollingPose, tile: Region, world_from_obj: Array) -> DeviceFloat:
-    """ROW_NUMBERS numbers for each row of a tile: rotation and origin of the scene's frame from the camera's.
-
-    A tile's rows below the picture have the poses of a longer picture; nobody sees them.
-    """
-    obj_from_cam = cam_from_obj.at_rows(np.arange(tile.y, tile.y + tile.height)).inverse()
-    rotation = world_from_obj[:3, :3] @ obj_from_cam.R
-    origin = obj_from_cam.t @ world_from_obj[:3, :3].T + world_from_obj[:3, 3]
-    table = np.concatenate((rotation.reshape(-1, 9), origin), axis=1)
-    return backend.load().Float(table.astype(np.float32).ravel())
 
 
 def _description(
@@ -113,15 +104,6 @@ def _image_from_film(size: Any, offset: Any, focal: tuple[float, float], centre:
     return [np.array(size) / focal, (np.array(offset) - HALF_PIXEL - centre) / focal]
 
 
-def _direction(law: DeviceLens, image: DevicePoint2) -> tuple[DeviceVector3, DeviceBool]:
-    """Directions of rays in camera axes through normalised image coordinates, and whether the lens sees them."""
-    mi, dr = backend.load(), backend.jit()
-    rho = dr.norm(image)
-    theta = incidence_angle(law, dr.minimum(rho, law.rho_max))
-    side = dr.select(rho > 0.0, theta.sine / rho, 1.0)  # on the axis both coordinates are 0
-    return mi.Vector3f(image.x * side, image.y * side, theta.cosine), rho <= law.rho_max
-
-
 @functools.cache
 def register_sensor() -> None:
     """Define and register the plugin, once in this process.
@@ -138,14 +120,13 @@ def register_sensor() -> None:
             super().__init__(props)
             coefficients = tuple(props[f"k{i}"] for i in range(1, 1 + MOST_COEFFICIENTS) if f"k{i}" in props)
             to_world = np.array(props["to_world"].matrix, dtype=np.float64)
-            self.law = device_lens(props["lens"], coefficients)
             focal, centre = ((props[x], props[y]) for x, y in (("fx", "fy"), ("cx", "cy")))
             scale, shift = _image_from_film(self.film().crop_size(), self.film().crop_offset(), focal, centre)
-            self.scale, self.shift = mi.Vector2f(scale), mi.Vector2f(shift)
-            self.rotation, self.origin = mi.Matrix3f(to_world[:3, :3]), mi.Point3f(to_world[:3, 3])
+            law = device_lens(props["lens"], coefficients)
+            place = mi.Matrix3f(to_world[:3, :3]), mi.Point3f(to_world[:3, 3])
+            self.film_rays = FilmRays(law, mi.Vector2f(scale), mi.Vector2f(shift), *place)
             # Opaque, so that one kernel serves all poses, regions and cameras of a lens.
-            dr.make_opaque(self.scale, self.shift, self.rotation, self.origin)
-            self.rows: DeviceFloat | None = None  # a placement for each row of the film, under a rolling shutter
+            dr.make_opaque(self.film_rays.scale, self.film_rays.shift, *place)
             self.m_needs_sample_2 = True
 
         def sample_ray(
@@ -156,23 +137,13 @@ def register_sensor() -> None:
             sample3: DevicePoint2,
             active: DeviceBool | bool = True,
         ) -> tuple[DeviceRay, DeviceSpectrum]:
-            direction, seen = _direction(self.law, sample2 * self.scale + self.shift)
-            rotation, origin = self.placement(sample2.y)
+            origin, direction, seen = self.film_rays.through(sample2, sample3)
             ray = dr.zeros(mi.Ray3f, dr.width(direction))
-            ray.o, ray.d, ray.time = mi.Point3f(origin), dr.normalize(rotation @ direction), time
+            ray.o, ray.d, ray.time = origin, direction, time
             ray.maxt = dr.select(seen, dr.largest(mi.Float), 0.0)
             # A kernel of its own, so that the large one that traces the rays is compiled once for all lenses.
             dr.eval(ray, seen)
             return ray, dr.select(seen, mi.Spectrum(1.0), mi.Spectrum(0.0))
-
-        def placement(self, down: DeviceFloat) -> tuple[DeviceMatrix3, DevicePoint3]:
-            """Rotation and origin at the time of the row that lies at a height of the film, from 0 to 1."""
-            if self.rows is None:
-                return self.rotation, self.origin
-            rows = dr.width(self.rows) // ROW_NUMBERS
-            row = dr.clip(dr.floor(down * rows), 0.0, rows - 1.0)
-            numbers = [dr.gather(mi.Float, self.rows, mi.UInt32(row) * ROW_NUMBERS + i) for i in range(ROW_NUMBERS)]
-            return mi.Matrix3f(*numbers[:9]), mi.Point3f(*numbers[9:])
 
         def sample_ray_differential(
             self,
@@ -189,6 +160,6 @@ def register_sensor() -> None:
             return mi.ScalarBoundingBox3f()
 
         def to_string(self) -> str:
-            return f"Fisheye[{self.law.name}]"
+            return f"Fisheye[{self.film_rays.law.name}]"
 
     mi.register_sensor(SENSOR, Fisheye)

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import functools
-import gc
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eposit import Camera, Pose
 from render import backend
 from render.colour import luminance
 from render.light import Light
-from render.pathtraced.tiles import Film, Tracer, trace_region
+from render.pathtraced.tiles import Film, Tracer, Viewpoint, trace_region
 from render.targets.image_region import Region
 from render.targets.kinds import AnyTarget
 from render.world import World, WorldDraw
@@ -23,15 +20,6 @@ CARD = Parts(has_card=True)
 METER_POINTS, METER_RAYS = 32, 16  # points along each side of the card, rays from each
 METER_SEED = 20
 CARD_GAP_MM = 1.0  # between the card and where its rays begin
-
-
-@dataclass(frozen=True, slots=True)
-class Viewpoint:
-    """From where a frame is seen, and the seed of its rays."""
-
-    camera: Camera
-    cam_from_obj: Pose
-    seed: int  # 32 bits
 
 
 def trace_picture(
@@ -49,7 +37,7 @@ def trace_picture(
         return world.path_samples if _overlap(tile, near) else world.background_samples
 
     tracer, gain = prepared(world, draw, target, light)
-    film = trace_region(tracer, view.camera, view.cam_from_obj, region, samples, view.seed)
+    film = trace_region(tracer, view, region, samples)
     film[..., :3] *= np.float32(gain)
     return film
 
@@ -65,7 +53,6 @@ def prepared(world: World, draw: WorldDraw, target: AnyTarget, light: Light) -> 
         ValueError: no light reaches the target, or the user's scene cannot be used.
     """
     prepared.cache_clear()
-    gc.collect()
     gain = metered_gain(world, draw, target, light)
     return tracer_of(world, draw, target, light), gain
 
@@ -107,9 +94,7 @@ def _card_radiance(tracer: Tracer, target: AnyTarget) -> NDArray[np.float32]:
     origins = np.repeat(points[:, :3], METER_RAYS, axis=0)
     sampler = mi.load_dict({"type": "independent", "sample_count": 1})
     sampler.seed(METER_SEED, len(origins))
-    ray = mi.Ray3f(
-        mi.Point3f(*(backend.upload(part) for part in origins.T)), mi.Vector3f(*backend.opaque(*inwards))
-    )
+    ray = mi.Ray3f(mi.Point3f(*(backend.upload(part) for part in origins.T)), mi.Vector3f(*backend.opaque(*inwards)))
     with dr.suspend_grad():
         radiance, _, _ = tracer.integrator.sample(tracer.scene, sampler, mi.RayDifferential3f(ray))
         dr.eval(radiance)

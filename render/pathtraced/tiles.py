@@ -16,10 +16,12 @@ from numpy.typing import NDArray
 
 from eposit import Camera, Pose
 from render import backend
+from render.optics import Optics
 from render.pathtraced.fisheye import tile_sensor
 from render.targets.image_region import Region
 from render.world.compose import Composition
 
+PINHOLE = Optics()
 TILE = 128  # px along a side
 Film = NDArray[np.float32]  # (height, width, 4) linear RGB and share of hits
 
@@ -33,16 +35,24 @@ class Tracer:
     composition: Composition
 
 
-def trace_region(
-    tracer: Tracer, camera: Camera, cam_from_obj: Pose, region: Region, samples: Callable[[Region], int], seed: int
-) -> Film:
+@dataclass(frozen=True, slots=True)
+class Viewpoint:
+    """From where a frame is seen, by which lens, and the seed of its rays."""
+
+    camera: Camera
+    cam_from_obj: Pose
+    seed: int  # 32 bits
+    optics: Optics = PINHOLE
+
+
+def trace_region(tracer: Tracer, view: Viewpoint, region: Region, samples: Callable[[Region], int]) -> Film:
     """The film of a region of the picture.
 
-    samples: rays for a pixel of a tile; the sampler may round up. seed: of the frame, 32 bits.
+    samples: rays for a pixel of a tile; the sampler may round up.
     """
     film = np.zeros((region.height, region.width, 4), np.float32)
     for tile in tiles_of(region):
-        part = trace_tile(tracer, camera, cam_from_obj, tile, samples(tile), seed)
+        part = trace_tile(tracer, view, tile, samples(tile))
         rows = slice(max(tile.y, region.y), min(tile.y + TILE, region.y + region.height))
         columns = slice(max(tile.x, region.x), min(tile.x + TILE, region.x + region.width))
         film[_shifted(rows, region.y), _shifted(columns, region.x)] = part[
@@ -58,12 +68,13 @@ def tiles_of(region: Region) -> Iterator[Region]:
             yield Region(x * TILE, y * TILE, TILE, TILE)
 
 
-def trace_tile(tracer: Tracer, camera: Camera, cam_from_obj: Pose, tile: Region, samples: int, seed: int) -> Film:
+def trace_tile(tracer: Tracer, view: Viewpoint, tile: Region, samples: int) -> Film:
     """(TILE, TILE, 4) film of one tile."""
     dr = backend.jit()
-    sensor = tile_sensor(camera, cam_from_obj, tile, samples, tracer.composition.world_from_obj)
+    place = tile, samples, tracer.composition.world_from_obj
+    sensor = tile_sensor(view.camera, view.cam_from_obj, *place, view.optics.pupil)
     with dr.suspend_grad():
-        film = tracer.integrator.render(tracer.scene, sensor, seed=tile_seed(seed, tile), spp=0)
+        film = tracer.integrator.render(tracer.scene, sensor, seed=tile_seed(view.seed, tile), spp=0)
     return np.array(film)
 
 

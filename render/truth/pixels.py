@@ -64,7 +64,7 @@ def _hits(
     """
     mi = backend.load()
     rotation, scale = _rotation_and_scale(world_from_obj)
-    poses = poses_at(cam_from_obj, np.arange(height))
+    poses = poses_at(cam_from_obj, np.arange(height, dtype=np.float64))
     bands = len(poses.t)  # of pixels that are exposed at one time
     cam_from_world = poses.R @ rotation.T
     origin = np.repeat(in_world(world_from_obj, poses.inverse().t), len(bearing) // bands, axis=0).astype(np.float32)

@@ -41,13 +41,13 @@ def card_shapes(target: AnyTarget) -> Objects:
 
 def stand_shapes(target: AnyTarget, floor_mm: float) -> Objects:
     """A thin plate behind the board, a pole and a foot, so that it does not float."""
-    x0, x1, y0, y1 = target.extent_mm
-    middle = target.board_centre + 30.0 * -FRONT
-    ground = target.board_centre - floor_mm * UP + 30.0 * -FRONT
+    sheet, centre = target.sheet, target.board_centre
+    deepest = max(0.0, sheet.sag_mm) * -FRONT  # of a bent board, behind its middle
+    width, height = (2.0 * sheet.half_sides).tolist()
+    middle = centre + deepest + 30.0 * -FRONT
+    ground = middle - floor_mm * UP
     return {
-        "stand_plate": box(
-            np.array([(x0 + x1) / 2.0, (y0 + y1) / 2.0, 8.0]), (x1 - x0, y1 - y0, 12.0), 0.0, diffuse(BACK)
-        ),
+        "stand_plate": box(centre + deepest + 8.0 * -FRONT, (width, height, 12.0), 0.0, diffuse(BACK)),
         "stand_pole": pole(ground, middle, 22.0, diffuse((0.25, 0.25, 0.27))),
         "stand_foot": box(ground + 15.0 * UP, (500.0, 30.0, 500.0), 0.0, diffuse((0.2, 0.2, 0.22))),
     }

@@ -173,7 +173,7 @@ def _mesh_object(shape: MeshShape, matrix: Array) -> Any:
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     parameters = mi.traverse(made)
     for name, values in (("positions", vertices), ("normals", normals), ("texcoords", mesh.uv)):
-        parameters[f"vertex_{name}"] = mi.Float(values.astype(np.float32).ravel())
-    parameters["faces"] = mi.UInt32(mesh.faces.astype(np.uint32).ravel())
+        parameters[f"vertex_{name}"] = backend.upload(values.ravel())
+    parameters["faces"] = backend.upload(mesh.faces.astype(np.uint32).ravel())
     parameters.update()
     return made

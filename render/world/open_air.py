@@ -25,7 +25,7 @@ def sky(world: World, draw: WorldDraw, target: AnyTarget, rng: np.random.Generat
     return {
         "sky": {
             "type": "sunsky",
-            "sun_direction": _sun_direction(draw).tolist(),
+            "sun_direction": sun_direction(draw).tolist(),
             "turbidity": world.turbidity,
             "to_world": frame_matrix(RIGHT, -FRONT, UP, np.zeros(3)),
         },
@@ -49,10 +49,10 @@ def environment(world: World, draw: WorldDraw) -> Objects:
     }
 
 
-def _sun_direction(draw: WorldDraw) -> Array:
-    """(3,) direction to the sun in the sky's own frame: x right, y to the back of the target, z up."""
+def sun_direction(draw: WorldDraw) -> Array:
+    """(3,) unit vector to the sun in the object frame, which is what Mitsuba takes it in, whatever the sky's own is."""
     elevation, turn = np.deg2rad(draw.sun_elevation_deg), np.deg2rad(draw.rotation_deg)
-    return np.array([np.cos(elevation) * np.sin(turn), -np.cos(elevation) * np.cos(turn), np.sin(elevation)])
+    return np.cos(elevation) * (np.sin(turn) * RIGHT + np.cos(turn) * FRONT) + np.sin(elevation) * UP
 
 
 def _around(rng: np.random.Generator, nearest: float, farthest: float) -> Array:

@@ -10,7 +10,8 @@ from render.frame import render_frame, render_world
 from render.hybrid.prepare import baked_light, hybrid_scene
 from render.light import Light
 from render.motion import PoseRate, RollingPose, image_points, points_in_cam, rolling_pose
-from render.pathtraced.picture import Viewpoint, trace_picture
+from render.pathtraced.picture import trace_picture
+from render.pathtraced.tiles import Viewpoint
 from render.region import target_region
 from render.sensor.develop import develop
 from render.sensor.presets import SensorModel

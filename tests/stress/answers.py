@@ -37,7 +37,7 @@ def _ours(image, board):
     count = board.inner[0] * board.inner[1] + board.disc
     try:
         found = detect_points(image, target_of(board))
-    except (ValueError, TypeError):
+    except ValueError:
         return Answer(np.full((count, 2), np.nan), np.full(count, REFUSED), np.full((count, 2, 2), np.nan))
     return Answer(found.points_px, found.status, found.covariance_px2)
 
@@ -52,14 +52,14 @@ def target_of(board):
     from render.targets.plain_chessboard import PlainChessboard
 
     sizes = {"columns": board.columns, "rows": board.rows, "square_mm": board.square}
-    discs = {"circle_square": board.disc_square, "circle_radius_mm": board.disc_radius,
-             "circle_height_mm": board.disc_height}  # fmt: skip
-    make = Chessboard if board.disc else PlainChessboard
-    given = sizes | (discs if board.disc else {})
+    if not board.disc:
+        return PlainChessboard(**sizes, margin_mm=board.margin * board.square)
+    sizes |= {"circle_square": board.disc_square, "circle_radius_mm": board.disc_radius}
+    sizes |= {"circle_height_mm": board.disc_height}
     try:
-        return make(**given, margin_squares=board.margin)
+        return Chessboard(**sizes, margin_squares=board.margin)
     except ValueError:  # a margin that it does not take; the detection does not need it
-        return make(**given)
+        return Chessboard(**sizes)
 
 
 def _opencv(detector, image, board):

@@ -8,7 +8,7 @@ from tests.stress.kinds import KINDS
 from tests.stress.measures import measured
 from tests.stress.sheet import keep_tile
 
-SHOWN = 1  # view on the sheet
+SHOWN = 0  # view on the sheet
 
 
 def children(detectors=DETECTORS):

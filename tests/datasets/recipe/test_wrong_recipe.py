@@ -85,6 +85,20 @@ RECIPES = {
         added("[optics]\nline_time_us = -1.0"),
         "optics line_time_us is -1.0; it must lie in 0 to 1000 microseconds",
     ),
+    "two focal lengths of grey": (
+        added("[optics]\nred_focal = 1.0003"),
+        "which takes pictures in colour; set colour = true under [outputs]",
+    ),
+    "focal length of another lens": (
+        added("[outputs]\ncolour = true\n[optics]\nblue_focal = 1.1"),
+        "optics blue_focal is 1.1; it must lie in 0.98 to 1.02",
+    ),
+    "open pupil without focus": (added("[optics]\naperture_mm = 4"), "focus_mm is left out; give the distance"),
+    "focus inside the lens": (added("[optics]\naperture_mm = 4\nfocus_mm = 3"), "it must be larger than aperture_mm"),
+    "open pupil in hybrid": (
+        added('[world]\nmethod = "hybrid"\n[optics]\naperture_mm = 4\nfocus_mm = 2000'),
+        "set method to path or closed, or aperture_mm to 0",
+    ),
     "negative full well": (added("[sensor]\nfull_well_e = -1"), "sensor full_well_e is -1.0; it must lie in 0 to"),
     "read noise without electrons": (added("[sensor]\nread_noise_e = 2.5"), "give full_well_e, which says how many"),
     "all light lost": (added("[sensor]\nvignetting = 1.0"), "sensor vignetting is 1.0; it must lie in 0 to 0.95"),

@@ -1,4 +1,4 @@
-"""A flipped bit in any file is found by `verify`, or changes nothing that is read; no reader hands on a damaged value."""
+"""A flipped bit is found by `verify`, or changes nothing that is read; no reader hands on a damaged value."""
 
 from __future__ import annotations
 

@@ -165,7 +165,7 @@ def test_a_corner_that_is_sharp_but_elsewhere_is_dropped(demo):
     _, image, truth = demo[1]
     image = image.copy()
     x, y = np.rint(truth[30]).astype(int)
-    image[y - 14 : y + 15, x - 14 : x + 15] = demo[1][1][y - 14 : y + 15, x - 15 : x + 14]
+    image[y - 11 : y + 12, x - 11 : x + 12] = demo[1][1][y - 11 : y + 12, x - 12 : x + 11]
     found = detect_points(image, TARGET)
     assert found.status[30] == "corners_inconsistent"
     assert np.isnan(found.points_px[30]).all()

@@ -51,6 +51,14 @@ def test_a_pose_that_leaves_its_start_farther_than_the_start_allows_is_inconsist
     assert refined(case, case.picture(), start=START * 1e-4).status == Status.INCONSISTENT
 
 
+def test_a_pose_that_is_less_certain_than_its_start_is_inconsistent(case):
+    """The pixels hold more than any points read from them, unless the picture is not the model's."""
+    found = refined(case, case.picture())
+    off = 0.1 * np.sqrt(np.diag(found.covariance))
+    for share, status in ((1.2, Status.OK), (0.8, Status.INCONSISTENT)):
+        assert refined(case, case.picture(), off, share * found.covariance).status == status
+
+
 def test_a_picture_of_something_else_is_no_pose(case):
     noise = np.random.default_rng(1).integers(0, 255, (300, 400), dtype=np.uint8)
     for image in (noise, np.full((300, 400), 90, np.uint8), case.picture()[::-1].copy()):

@@ -1,4 +1,4 @@
-"""Datasets of a rolling shutter: what is recorded, the same bits, and detection against truth."""
+"""Datasets with lens and shutter: what is recorded, the same bits, and detection against truth."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import pytest
 from datasets.plan import plan
 from datasets.recipe.model import parse_recipe
 from datasets.store.dataset import open_dataset
+from datasets.store.images import decode_pixels
 from datasets.store.linear_images import linear_key
 from datasets.store.nulls import with_nans
 from render.motion import image_points
@@ -79,3 +80,29 @@ def test_a_rolling_picture_has_the_same_bits_by_two_workers(made, tiny, tmp_path
     assert command("run", recipe, "--out", tmp_path / "two", "--workers", 2, "-q") == 0
     frames = [open_dataset(folder).read("frames") for folder in (root, tmp_path / "two")]
     assert frames[0].equals(frames[1])
+
+
+COLOUR = "\n[outputs]\ncolour = true\n"
+
+
+def test_each_thing_of_the_lens_decides_content_and_light(tiny):
+    texts = ("red_focal = 1.0003", "blue_focal = 0.9997", "aperture_mm = 4\nfocus_mm = 2100", "line_time_us = 20")
+    recipes = [parse_recipe(f"{tiny[0]}{COLOUR}[optics]\n{text}\n", text) for text in ("", *texts)]
+    assert len({recipe.digest() for recipe in recipes}) == len(recipes)
+    assert len({linear_key(recipe, plan(recipe)[0]) for recipe in recipes}) == len(recipes)
+
+
+def test_a_dataset_through_an_open_pupil_in_three_colours(tiny, tmp_path, content):
+    """Its bits are those of another run, and truth is green's, seen through the pupil's middle."""
+    recipe = tmp_path / "recipe.toml"
+    recipe.write_text(
+        f"{tiny[0]}{COLOUR}[optics]\nred_focal = 1.002\nblue_focal = 0.998\naperture_mm = 6\nfocus_mm = 2300\n"
+    )
+    for name in ("one", "two"):
+        assert command("generate", recipe, "--out", tmp_path / name, "--workers", 1, "-q") == 0
+    assert content(tmp_path / "one") == content(tmp_path / "two")
+    plain, found = (open_dataset(root).read("keypoints") for root in (tiny[1], tmp_path / "one"))
+    assert plain.equals(found)
+    image = decode_pixels(open_dataset(tmp_path / "one").read("frames")["image"][0].as_py()["bytes"])
+    assert image.shape == (300, 400, 3)
+    assert np.any(image[..., 0] != image[..., 2])

@@ -12,10 +12,14 @@ from render.world import World, draw_world
 TARGET, LIGHT = Chessboard(columns=5, rows=4), Light()  # small: its bake is quick
 
 
+def baked(surface):
+    world = World(method="hybrid", path_depth=2, bake_samples=64, surface=surface)
+    return baked_light(world, draw_world(world, np.random.default_rng(1)), TARGET, LIGHT)
+
+
 @pytest.fixture(scope="module")
 def studio():
-    world = World(method="hybrid", path_depth=2, bake_samples=64)
-    return baked_light(world, draw_world(world, np.random.default_rng(1)), TARGET, LIGHT)
+    return baked("matt")
 
 
 def test_the_studios_light_is_that_of_the_closed_form(studio):
@@ -27,11 +31,16 @@ def test_the_studios_light_is_that_of_the_closed_form(studio):
     np.testing.assert_allclose(studio.disc, disc, rtol=0.005)
 
 
+def test_the_circle_is_matt_on_a_laminated_board(studio):
+    """A laminate changes what the paint below it gets from each direction; the circle has none, and gets the same."""
+    np.testing.assert_allclose(baked("laminated").disc, studio.disc, rtol=1e-6)
+
+
 def test_nothing_is_darker_around_the_circle(studio):
     """An average that is too wide would spread the shade under the disc to where it is seen."""
     expected, _ = shading_map(TARGET, LIGHT)
     grid, place = disc_grid(TARGET)
-    x, y, _ = grid.points().T
+    x, y = grid.places().T
     distance = np.hypot(x - TARGET.circle_centre[0], y - TARGET.circle_centre[1]).reshape(grid.rows, grid.columns)
     error = (studio.board.mean(axis=2) / expected - 1.0)[place]
     for low in (30.0, 35.0, 40.0, 50.0):

@@ -9,7 +9,7 @@ from render import backend
 from render.frame import render_frame, render_world
 from render.hybrid.prepare import baked_light, hybrid_scene
 from render.light import Light
-from render.pathtraced.picture import Viewpoint
+from render.pathtraced.tiles import Viewpoint
 from render.region import target_region
 from render.targets.chessboard import Chessboard
 from render.targets.image_region import Region

@@ -21,9 +21,9 @@ def test_the_coarse_grid_does_not_grow_with_the_board():
 
 def test_light_that_rises_evenly_is_magnified_exactly():
     coarse, fine = coarse_grid(TARGET), fine_grid(TARGET)
-    x, y, _ = coarse.points().T
+    x, y = coarse.places().T
     found = magnified((2.0 * x + 3.0 * y).reshape(coarse.rows, coarse.columns, 1), coarse, fine)[..., 0]
-    x, y, _ = fine.points().T
+    x, y = fine.places().T
     expected = (2.0 * x + 3.0 * y).reshape(fine.rows, fine.columns)
     np.testing.assert_allclose(found[5:-5, 5:-5], expected[5:-5, 5:-5], atol=1e-9)
     assert np.abs(found - expected).max() < 5.0 * coarse.step[0]  # clamped beyond the outermost centres
@@ -31,10 +31,10 @@ def test_light_that_rises_evenly_is_magnified_exactly():
 
 def test_a_patch_lies_on_the_texels_of_the_fine_grid():
     fine, (near, place) = fine_grid(TARGET), disc_grid(TARGET)
-    points = fine.points().reshape(fine.rows, fine.columns, 3)[place]
-    np.testing.assert_allclose(near.points().reshape(points.shape), points, atol=1e-9)
-    middle = near.points().mean(axis=0)
-    assert np.hypot(*(middle - TARGET.circle_centre)[:2]) < 1.0
+    points = fine.places().reshape(fine.rows, fine.columns, 2)[place]
+    np.testing.assert_allclose(near.places().reshape(points.shape), points, atol=1e-9)
+    middle = near.places().mean(axis=0)
+    assert np.hypot(*(middle - TARGET.circle_centre[:2])) < 1.0
 
 
 def test_a_patch_takes_over_step_by_step():

@@ -12,8 +12,8 @@ from eposit.pose import rotation_from_euler
 from render import backend
 from render.frame import render_frame, render_world
 from render.light import Light
-from render.pathtraced.picture import Viewpoint, prepared, trace_picture
-from render.pathtraced.tiles import TILE, Tracer, tile_seed, tiles_of, trace_region
+from render.pathtraced.picture import prepared, trace_picture
+from render.pathtraced.tiles import TILE, Tracer, Viewpoint, tile_seed, tiles_of, trace_region
 from render.region import target_region
 from render.targets.chessboard import Chessboard
 from render.targets.image_region import Region
@@ -137,7 +137,7 @@ def test_white_furnace(lens):
     integrator = mi.load_dict({"type": "path", "max_depth": 64, "rr_depth": 64})
     tracer = Tracer(scene, integrator, Composition({}, np.eye(4), shows_emitters=True))
     where = view(depth=700.0, camera=CAMERA.replace(lens=lens, width=120, height=120, cx=60.0, cy=60.0))
-    film = trace_region(tracer, where.camera, where.cam_from_obj, Region.whole(120, 120), lambda _: 16, 1)
+    film = trace_region(tracer, dataclasses.replace(where, seed=1), Region.whole(120, 120), lambda _: 16)
     radius = np.hypot(*np.meshgrid(np.arange(120) - 60.0, np.arange(120) - 60.0)) / 60.3
     inside = film[radius < min(where.camera.law.rho_max, 1e3) - 0.05][:, :3]
     difference = inside[:, 0] - 1.0

@@ -10,7 +10,7 @@ import pytest
 from eposit import Camera, Pose
 from eposit.pose import rotation_from_euler
 from render import backend
-from render.frame import truth_of
+from render.frame_truth import truth_of
 from render.light import Light
 from render.targets.chessboard import Chessboard
 from render.truth.pixels import pixel_truth

@@ -1,0 +1,73 @@
+"""How blurred the edges of a board are, from its picture and a first map that may be a pixel off."""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+
+from eposit.arrays import Array
+from pipelines.detection.board_map import BoardMap, normal_angles
+from pipelines.detection.corner_sites import CornerSites
+from pipelines.detection.finders import Grey
+
+MOST_CORNERS = 9  # that are looked at
+PLACES = (0.4, 0.55, 0.7)  # on an edge, in reaches from the corner: their profiles are averaged
+LONGEST_PX = 14.0  # half a profile
+STEP_PX = 0.5
+LEAST_CONTRAST = 0.5  # of the median one: what a profile must have
+ENDS = 0.2  # share of a profile at each end, which is taken for white or black
+LIMITS_PX = (0.4, 6.0)
+SAMPLING = 1.0 / 6.0  # variance that linear interpolation adds, px^2
+FALLBACK_PX = 0.8  # an ordinary lens in focus
+
+
+def measured_blur(image: Grey, board: BoardMap, sites: CornerSites) -> float:
+    """Standard deviation, px, of the blur of the edges beside the corners, the pixels' own area included.
+
+    An edge's profile q, from 0 to 1, of a blur sigma has the integral of q (1 - q) equal to sigma / sqrt(pi), wherever
+    the edge lies in it.
+    """
+    at = sites.at[:: max(1, len(sites.at) // MOST_CORNERS)]
+    profiles, step = _profiles(image, board, at, sites.reach)
+    ends = max(2, int(ENDS * profiles.shape[1]))
+    low, high = profiles[:, :ends].mean(axis=1), profiles[:, -ends:].mean(axis=1)
+    contrast = high - low
+    clear = np.abs(contrast) > LEAST_CONTRAST * np.median(np.abs(contrast))
+    if not np.any(clear):
+        return FALLBACK_PX
+    q = (profiles[clear] - low[clear, None]) / contrast[clear, None]
+    product = q * (1.0 - q)
+    flat = 0.5 * (product[:, :ends].mean(axis=1) + product[:, -ends:].mean(axis=1))  # noise alone makes it negative
+    widths = math.sqrt(math.pi) * np.sum(product - np.minimum(flat, 0.0)[:, None], axis=1) * step[clear]
+    sigma = float(np.median(widths))
+    return float(np.clip(math.sqrt(max(sigma * abs(sigma) - SAMPLING, 0.0)), *LIMITS_PX))
+
+
+def _profiles(image: Grey, board: BoardMap, at: Array, reach: float) -> tuple[Array, Array]:
+    """(k, s) grey values across edges beside corners, and (k,) px between their samples."""
+    jacobian, middle = board.jacobian(at), board(at)
+    angles = normal_angles(jacobian)
+    found: list[Array] = []
+    steps: list[Array] = []
+    lengths = np.linalg.norm(jacobian, axis=1)
+    area = np.abs(np.linalg.det(jacobian))
+    count = 2 * int(LONGEST_PX / STEP_PX) + 1
+    for k in range(2):  # edges along x, then along y, and their normals
+        normal = np.stack((np.cos(angles[:, 1 - k]), np.sin(angles[:, 1 - k])), axis=-1)
+        half = np.minimum(LONGEST_PX, reach * area / lengths[:, k])
+        across = np.linspace(-1.0, 1.0, count)[:, None] * (half[:, None] * normal)[:, None]
+        for way in (1.0, -1.0):
+            bases = [middle + way * place * reach * jacobian[:, :, k] for place in PLACES]
+            places = np.stack([base[:, None] + across for base in bases]).astype(np.float32)
+            grey = cv2.remap(
+                image,
+                places[..., 0].reshape(-1, count),
+                places[..., 1].reshape(-1, count),
+                cv2.INTER_LINEAR,
+                borderMode=cv2.BORDER_REPLICATE,
+            )
+            found.append(grey.reshape(len(PLACES), len(at), count).mean(axis=0))
+            steps.append(2.0 * half / (count - 1))
+    return np.concatenate(found), np.concatenate(steps)

@@ -1,0 +1,35 @@
+"""What a worker process does: one task after the other, until its pipe closes."""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from multiprocessing.reduction import ForkingPickler
+from typing import Any
+
+
+def serve(pipe: Connection, run_one: Callable[[Any], Any]) -> None:
+    """Receive tasks; send back (result, None, "") of each, or (None, exception, traceback)."""
+    while True:
+        try:
+            task = pipe.recv()
+        except EOFError:
+            return
+        pipe.send(_outcome(run_one, task))
+
+
+def _outcome(run_one: Callable[[Any], Any], task: Any) -> tuple[Any, BaseException | None, str]:
+    try:
+        return run_one(task), None, ""
+    except Exception as error:
+        return None, _picklable(error), traceback.format_exc()
+
+
+def _picklable(error: Exception) -> Exception:
+    """The error itself, or what it says where it cannot go through a pipe."""
+    try:
+        ForkingPickler.loads(ForkingPickler.dumps(error))
+    except Exception:
+        return RuntimeError(f"{type(error).__name__}: {error}")
+    return error

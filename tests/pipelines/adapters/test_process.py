@@ -1,0 +1,117 @@
+"""Whatever a user's function does to its process is a status of one image; the others are solved."""
+
+from __future__ import annotations
+
+import contextlib
+
+import pytest
+
+from datasets.errors import UserError
+from pipelines.adapters import process
+from pipelines.adapters.process import Form, check_limit, end_function_process, function_process
+from tests.own import own_module
+from tests.wrong_input import assert_one_sentence
+
+FORM = Form("--estimator", "(image, camera, target)", 3)
+MISCHIEF = """
+    import os, signal, sys, time
+    import numpy as np
+
+    def act(image, camera, target):
+        if image == "exit":
+            os._exit(3)
+        if image == "leave":
+            sys.exit(4)
+        if image == "hang":
+            while True:
+                pass
+        if image == "crash":
+            os.kill(os.getpid(), signal.SIGSEGV)
+        if image == "fork":
+            os.fork()
+        if image == "fork and stay":
+            if os.fork() == 0:
+                time.sleep(600)
+        if image == "infinite":
+            return np.eye(3), [np.inf, 0.0, 1.0]
+        if image == "print":
+            print("so many words")
+        if image == "recurse":
+            return act(image, camera, target)
+        if image == "close":
+            for number in range(3, 50):
+                try:
+                    os.close(number)
+                except OSError:
+                    pass
+        return np.eye(3), [0.0, 0.0, 1.0]
+"""
+ENDS = {
+    "exit": "ended its process, which ended with exit code 3",
+    "leave": "SystemExit: 4",
+    "hang": "took longer than 5 s",
+    "crash": "ended its process, which was ended by SIGSEGV",
+    "infinite": "a pose that is not finite, with the status ok",
+    "recurse": "RecursionError: maximum recursion depth exceeded",
+}
+HARMLESS = ("fork", "fork and stay", "print", "")
+
+
+@contextlib.contextmanager
+def closing_process(name, limit_s=5.0):
+    yield function_process(name, FORM, limit_s)
+    end_function_process()
+
+
+@pytest.fixture
+def name(tmp_path, monkeypatch):
+    return f"{own_module(tmp_path, monkeypatch, MISCHIEF)}:act"
+
+
+def test_whatever_a_function_does_is_a_status(name, capfd):
+    with closing_process(name) as called:
+        for image in (*ENDS, *HARMLESS):
+            notes = []
+            answer = called.call(notes.append, image, None, None)
+            assert answer.status == ("solver_error" if image in ENDS else "ok"), image
+            assert [note.startswith(ENDS[image]) for note in notes] == ([True] if image in ENDS else [])
+            assert called.call(notes.append, "", None, None).status == "ok"
+    out, err = capfd.readouterr()
+    assert out == ""  # which tables and JSON go to
+    assert err == "so many words\n"
+
+
+def test_a_process_that_loses_its_pipe_is_a_status(name):
+    with closing_process(name) as called:
+        assert called.call(lambda _: None, "close", None, None).status == "solver_error"
+        assert called.call(lambda _: None, "", None, None).status == "ok"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("import os; os._exit(0)", "importing it failed: it ended its process, which ended with exit code 0"),
+        ("while True: pass", "importing it failed: it took longer than 30 s"),
+        ("1 / 0", "failed with ZeroDivisionError: division by zero"),
+    ],
+)
+def test_a_module_that_does_harm_when_imported_is_a_sentence(text, words, tmp_path, monkeypatch):
+    module = own_module(tmp_path, monkeypatch, text)
+    monkeypatch.setattr(process, "START_S", 30.0)  # for an import on a crowded machine
+    with pytest.raises(UserError, match=words):
+        function_process(f"{module}:act", FORM, 4.0)
+
+
+@pytest.mark.parametrize("limit", [0.0, -1.0, float("nan"), float("inf"), 1e9])
+def test_a_time_limit_that_is_none(limit):
+    with pytest.raises(UserError, match="give seconds above 0"):
+        check_limit(limit)
+
+
+def test_a_function_that_hangs_in_a_dataset(root, cli, tmp_path, monkeypatch):
+    module = own_module(tmp_path, monkeypatch, "import time\ndef solve(a, b, camera):\n    time.sleep(600)\n")
+    done = cli("estimate", root, "--solver", f"{module}:solve", "--timeout", "5", "-q")
+    assert done.code == 0
+    assert "2 of 2 rows have the status solver_error; frame 0: took longer than 5 s" in done.err
+    done = cli("estimate", root, "--solver", f"{module}:solve", "--timeout", "0", "-q")
+    assert_one_sentence(done.code, done.err, "--timeout 0: give seconds above 0")
