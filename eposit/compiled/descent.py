@@ -119,6 +119,17 @@ def _accept(w, pose):
     copy(w, PROPOSAL, pose, 12)
 
 
+@compiled(NOTHING, W, WHOLE, WHOLE, NUMBER, NUMBER)
+def _finish(w, n, pose, cost, floor):
+    """The last step is taken unless it raises the cost; at COST what it then is."""
+    moved(w, pose, MOVE, PROPOSAL)
+    w[COST] = cost_at(w, n, PROPOSAL)
+    if w[COST] <= _limit(cost, floor):
+        copy(w, PROPOSAL, pose, 12)
+    else:
+        w[COST] = cost
+
+
 @compiled(WHOLE, W, WHOLE, WHOLE, WHOLE, WHOLE, NUMBER)
 def descend(w, n, pose, count, L, newton):
     """Take the pose to a minimum: LOST, MINIMUM or MERGED. STEPS grows by the steps taken.
@@ -155,12 +166,7 @@ def descend(w, n, pose, count, L, newton):
         elif damping == 0.0:
             ratio = size / before if before < math.inf else 1.0
             if settled or size <= SHORT or size * (ratio * ratio if ratio < 0.1 else 1.0) <= STEP_TOL:
-                moved(w, pose, MOVE, PROPOSAL)
-                cost_new = cost_at(w, n, PROPOSAL)
-                if cost_new <= _limit(cost, floor):
-                    copy(w, PROPOSAL, pose, 12)
-                    cost = cost_new
-                w[COST] = cost
+                _finish(w, n, pose, cost, floor)
                 return MINIMUM
         if kicked:
             if kicks == KICKS:
