@@ -15,6 +15,7 @@ from pipelines.detection.textured_region import textured_region
 
 FIRST_PIXELS = 7e5  # of the level that is looked at first, at most
 MOST_PIXELS = 6.5e6  # of any
+LEAST_PICTURE_PX = 16
 LEAST_SIDE_PX = 60  # of a level
 ENLARGEMENT, LEAST_ENLARGEMENT, ENLARGED_PIXELS = 3.0, 1.3, 2.5e6
 
@@ -37,7 +38,9 @@ class LevelOf:
 
 
 def levels(image: NDArray[np.uint8]) -> Iterator[LevelOf]:
-    """The levels of an 8-bit picture (height, width)."""
+    """The levels of an 8-bit picture (height, width); none of one that is too small for a board."""
+    if min(image.shape) < LEAST_PICTURE_PX:
+        return
     whole = image.astype(np.float32)
     first = 1
     while whole.size / first**2 > FIRST_PIXELS:
