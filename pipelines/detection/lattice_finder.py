@@ -84,16 +84,22 @@ def _seen(level: LevelOf, target: AnyChessboard) -> Iterator[SeenLattice]:
         grid = verified(smoothed, grid_of(piece))
         if np.sum(grid.known) < LEAST_POINTS:
             continue
-        grid = grow(smoothed, grid, most)
+        if not _is_whole(grid, target):
+            grid = grow(smoothed, grid, most)
         seen = _told(level, smoothed, grid, target)
         if seen is not None:
             yield seen
 
 
+def _is_whole(grid: Grid, target: AnyChessboard) -> bool:
+    """Whether just as many points as the board has corners are known, in as many columns and rows."""
+    return bool(np.all(grid.known)) and sorted(grid.points.shape[:2]) == sorted(target.inner)
+
+
 def _told(level: LevelOf, smoothed: Level, grid: Grid, target: AnyChessboard) -> SeenLattice | None:
     """Which corners the lattice's points are; None if they are too few."""
     firm = _firm_part(smoothed, grid)
-    if np.sum(firm.known) < target.inner[0] * target.inner[1]:
+    if not _is_whole(firm, target):
         firm = _firm_part(smoothed, _bridged(level, smoothed, firm, target))
     count = int(np.sum(firm.known))
     if count < LEAST_POINTS:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from eposit.arrays import Array, Mask
 from pipelines.detection.lattice_grid import Grid, axes, likeness, predicted
@@ -60,9 +61,7 @@ def look_at(level: Level, grid: Grid, expected: Array, contrast: float, farthest
     if not np.any(use):
         return out
     at, ax, ay, signs = expected[use], along_x[use], along_y[use], grid.signs[use]
-    tries = np.stack([at + u * ax + v * ay for v in SEARCH for u in SEARCH])
-    likes = np.stack([np.nan_to_num(likeness(level, place, ax, ay, signs)[0], nan=-1.0) for place in tries])
-    best = np.take_along_axis(tries, likes.argmax(axis=0)[None, :, None], 0)[0]
+    best = _most_likely(level, at, ax, ay, signs)
     found = centred(level, best, side_of(ax, ay))
     like, has = likeness(level, found, ax, ay, signs)
     good = _look_like_corners(like, has, contrast) & _near(found, at, ax, ay, farthest)
@@ -70,7 +69,17 @@ def look_at(level: Level, grid: Grid, expected: Array, contrast: float, farthest
     return out
 
 
-def centred(level: Level, points: Array, side_px: float) -> Array:
+def _most_likely(level: Level, at: Array, along_x: Array, along_y: Array, signs: Array) -> Array:
+    """(n, 2) px of what looks most like a corner around (n, 2) px."""
+    u, v = np.tile(SEARCH, len(SEARCH)), np.repeat(SEARCH, len(SEARCH))
+    tries = at[:, None] + u[:, None] * along_x[:, None] + v[:, None] * along_y[:, None]
+    each = [np.repeat(part, len(u), axis=0) for part in (along_x, along_y, signs)]
+    like = likeness(level, tries.reshape(-1, 2), each[0], each[1], each[2])[0].reshape(tries.shape[:2])
+    best = np.nan_to_num(like, nan=-1.0).argmax(axis=1)
+    return tries[np.arange(len(at)), best]
+
+
+def centred(level: Level | NDArray[np.uint8], points: Array, side_px: float) -> Array:
     """(n, 2) px moved to the corners they are near to; as they are where that leads away.
 
     side_px: of the squares.
