@@ -50,7 +50,8 @@ LEAST_CONTRAST = 0.35  # of the board's: what a circle's edge must have
 SEARCH_SHARE = 0.1  # of a square: how far the centre may lie from where the board predicts it, if its map is sure
 FARTHEST_SHARE = 0.25  # of a square, however unsure it is
 CORNER_PX = 0.01  # an ordinary corner's uncertainty, of which that of the map follows
-LENS_SPREAD = (0.3, 100.0, 100.0, 0.3, 0.3, 0.3)  # of a lens about which nothing is known: see `generic_lens`
+ASPECT_SPREAD = 0.02  # of pixels that are not known to be square; or as far as the map's are from it
+LENS_SPREAD = (100.0, 100.0, 0.3, 0.3, 0.3)  # of the rest of a lens of which nothing is known: see `generic_lens`
 SURE_SHARE = 0.02  # of a square: a prediction less sure than this has the circle looked for around it
 LOOKS = 17  # places along the line on which a prediction is unsure
 FAR_SPREADS = 3.0  # of the prediction that a circle may lie off, for each that a linear map allows
@@ -84,7 +85,10 @@ def find_circle(
     if patch is None:
         return None
     known = _beforehand(contrast, target.circle_height_mm / target.circle_radius_mm, misfit)
-    fit = fit_disc(patch, replace(known, start=_best_start(patch, known, unsure, doubt / radius)))
+    fit = fit_disc(patch, known)
+    if doubt > 0.0:
+        other = fit_disc(patch, replace(known, start=_best_start(patch, known, unsure, doubt / radius)))
+        fit = min(fit, other, key=lambda one: (not one.converged, one.residual))
     shift = fit.values[:2]
     found = fit.converged and _is_near(shift * radius, unsure) and abs(fit.values[SIZE] - 1.0) < SIZE_LIMIT
     if not found or fit.values[WHITE_GREY] - fit.values[DISC_GREY] < LEAST_CONTRAST * contrast:
@@ -117,7 +121,8 @@ def _unsure(board: BoardMap, target: Chessboard) -> Array:
     """
     at, height = target.circle_centre[None, :2] / target.square_mm, target.circle_height_mm / target.square_mm
     slopes = board.slopes(grid(target.inner)).reshape(2 * target.circle_index, -1) / CORNER_PX
-    slopes = np.vstack((slopes, np.diag([0.0] * 7 + [1.0 / spread for spread in LENS_SPREAD])))
+    spread = np.array([max(ASPECT_SPREAD, abs(board.lens[1])), *LENS_SPREAD])
+    slopes = np.vstack((slopes, np.diag(np.append(np.zeros(7), 1.0 / spread))))
     displaced = (board.slopes(at, height) - board.slopes(at))[0]
     size = np.maximum(np.linalg.norm(slopes, axis=0), 1e-12)
     change = np.linalg.inv(board.jacobian(at[0])) @ displaced / size
@@ -131,12 +136,10 @@ def _doubt(unsure: Array) -> float:
 
 
 def _best_start(patch: Patch, known: Prior, unsure: Array, doubt: float) -> Array:
-    """What a fit is started from: the prediction, or the best place along the line on which it is unsure.
+    """The best place to start from along the line on which the prediction is unsure.
 
     unsure: (2, 2) covariance of the prediction. doubt: how far to look, radii.
     """
-    if doubt == 0.0:
-        return known.start
     along = np.linalg.eigh(unsure)[1][:, -1]
     places = np.linspace(-doubt, doubt, LOOKS)[:, None] * along
     starts = [known.start + np.append(place, np.zeros(SHAPE - 2)) for place in places]

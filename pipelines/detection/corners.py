@@ -23,6 +23,7 @@ CLEAR_BLURS = 2.6  # blurs to keep between a fit's pixels and the next edge
 START_LIMIT = 0.3  # of the local square: a fit that moves further has gone to another corner
 OWN_NOISE = 0.33  # share of a corner's own noise in what is stated for it; the rest is the board's median
 SURE_NOISE = 0.7  # of a corner's own noise that is stated at least: its pixels tell it to a tenth
+MOST_NOISE = 50.0  # of the board's median variance: a corner beyond it is covered, and no model of an edge is right
 NEAR_PX, NEAR_BLURS = 5, 2.5  # radius of the first window, px and blurs
 FINAL_PX, FARTHEST_PX = 10, 100  # least and largest radius of the final one
 BAND_PX, BAND_BLURS = 1.0, 3.0  # to either side of an edge: pixels farther off tell nothing of its place
@@ -113,6 +114,8 @@ def _fit(image: Grey, board: BoardMap, sites: CornerSites, shapes: Array, limits
     task = _task(board, jacobian, sites, shapes, limits.reach)
     fitted, covariance, noise, converged = fit_corners(image, task, limits.steps, STOP)
     good = _is_corner(fitted, covariance, task.starts, jacobian, sites)
+    with np.errstate(invalid="ignore"):
+        good &= noise <= MOST_NOISE * np.nanmedian(noise) if np.any(good) else True
     good &= converged if limits.must_converge else True
     points = fitted[:, :2]
     if not np.any(good):
