@@ -52,8 +52,10 @@ FARTHEST_SHARE = 0.25  # of a square, however unsure it is
 CORNER_PX = 0.01  # an ordinary corner's uncertainty, of which that of the map follows
 ASPECT_SPREAD = 0.02  # of pixels that are not known to be square; or as far as the map's are from it
 LENS_SPREAD = (100.0, 100.0, 0.3, 0.3, 0.3)  # of the rest of a lens of which nothing is known: see `generic_lens`
-SURE_SHARE = 0.02  # of a square: a prediction less sure than this has the circle looked for around it
-LOOKS = 17  # places along the line on which a prediction is unsure
+SURE_SHARE = 0.01  # of a square: a prediction less sure than this has the circle looked for around it
+LOOKS = (5, 9)  # places along both axes of the ellipse in which a circle is looked for
+LOOK_SPREADS = 10.0  # half its axes, in deviations of the prediction: it is far from linear
+GOOD_SHARE = 1.5  # of the residuals of the best fit in the ellipse, up to which a fit from the prediction is kept
 FAR_SPREADS = 3.0  # of the prediction that a circle may lie off, for each that a linear map allows
 SIZE_LIMIT = 0.03  # of the size
 LEAST_AXIS = 1.5  # blurs: a disc whose smaller half axis is below this has no edges of its own
@@ -79,16 +81,20 @@ def find_circle(
     centre, jacobian = board(at, height), board.jacobian(at, height)
     if np.linalg.svd(jacobian, compute_uv=False)[-1] * radius < LEAST_AXIS * blur_px:
         return None
+    known = _beforehand(contrast, target.circle_height_mm / target.circle_radius_mm, misfit)
     unsure = _unsure(board, target)
     doubt = _doubt(unsure)
-    patch = _patch(image, board, centre, jacobian, blur_px, target, doubt)
-    if patch is None:
+    patches = [
+        _patch(image, board, centre, jacobian, blur_px, target, more) for more in ((0.0, doubt) if doubt else (0.0,))
+    ]
+    fits = [
+        fit_disc(patch, replace(known, start=_best_start(patch, known, unsure, radius)) if k else known)
+        for k, patch in enumerate(patches)
+        if patch is not None
+    ]
+    if not fits:
         return None
-    known = _beforehand(contrast, target.circle_height_mm / target.circle_radius_mm, misfit)
-    fit = fit_disc(patch, known)
-    if doubt > 0.0:
-        other = fit_disc(patch, replace(known, start=_best_start(patch, known, unsure, doubt / radius)))
-        fit = min(fit, other, key=lambda one: (not one.converged, one.residual))
+    fit = fits[0] if fits[0].residual <= GOOD_SHARE * fits[-1].residual else fits[-1]
     shift = fit.values[:2]
     found = fit.converged and _is_near(shift * radius, unsure) and abs(fit.values[SIZE] - 1.0) < SIZE_LIMIT
     if not found or fit.values[WHITE_GREY] - fit.values[DISC_GREY] < LEAST_CONTRAST * contrast:
@@ -130,19 +136,22 @@ def _unsure(board: BoardMap, target: Chessboard) -> Array:
 
 
 def _doubt(unsure: Array) -> float:
-    """Squares around the prediction in which the circle is looked for."""
+    """Squares around the prediction in which the circle is looked for; 0 where the prediction is sure."""
     spread = math.sqrt(np.linalg.eigvalsh(unsure)[-1])
-    return FARTHEST_SHARE if spread > SURE_SHARE else 0.0
+    return min(LOOK_SPREADS * spread, FARTHEST_SHARE) if spread > SURE_SHARE else 0.0
 
 
-def _best_start(patch: Patch, known: Prior, unsure: Array, doubt: float) -> Array:
-    """The best place to start from along the line on which the prediction is unsure.
+def _best_start(patch: Patch, known: Prior, unsure: Array, radius: float) -> Array:
+    """The best start on a grid over the ellipse in which the prediction is unsure.
 
-    unsure: (2, 2) covariance of the prediction. doubt: how far to look, radii.
+    unsure: (2, 2) covariance of the prediction, squares^2. radius: of the circle, squares.
     """
-    along = np.linalg.eigh(unsure)[1][:, -1]
-    places = np.linspace(-doubt, doubt, LOOKS)[:, None] * along
-    starts = [known.start + np.append(place, np.zeros(SHAPE - 2)) for place in places]
+    variances, axes = np.linalg.eigh(unsure)
+    reach = np.minimum(LOOK_SPREADS * np.sqrt(np.maximum(variances, 0.0)), FARTHEST_SHARE) / radius
+    minor, major = (np.linspace(-far, far, count) for far, count in zip(reach, LOOKS, strict=True))
+    starts = [
+        known.start + np.append(a * axes[:, 0] + b * axes[:, 1], np.zeros(SHAPE - 2)) for a in minor for b in major
+    ]
     return min(starts, key=lambda start: cost_of(patch, known, start))
 
 

@@ -72,7 +72,7 @@ class DiscFit:
     values: Array  # (14,)
     covariance: Array  # (14, 14)
     converged: bool
-    residual: float  # sum of squares, grey values^2
+    residual: float  # mean square, grey values^2
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,13 +190,16 @@ def fit_disc(patch: Patch, prior: Prior) -> DiscFit:
             values[:SHAPE] += step[:SHAPE]
             covariance = np.linalg.inv(normal) * noise
             return DiscFit(
-                values, covariance * _unexplained(patch, jacobian, best, covariance), True, float(best @ best)
+                values,
+                covariance * _unexplained(patch, jacobian, best, covariance),
+                True,
+                float(best @ best / len(best)),
             )
         trial = values.copy()
         trial[:SHAPE] += np.clip(step[:SHAPE], -FURTHEST_STEP, FURTHEST_STEP)
         trial[SHADOW] = np.clip(trial[SHADOW], -prior.furthest_shadow, prior.furthest_shadow)
         trial[SOFTNESS] = np.clip(trial[SOFTNESS], *SOFTNESS_LIMITS)
-    return DiscFit(values, np.linalg.inv(normal) * noise, False, float(best @ best))
+    return DiscFit(values, np.linalg.inv(normal) * noise, False, float(best @ best / len(best)))
 
 
 def cost_of(patch: Patch, prior: Prior, shape: Array) -> float:
