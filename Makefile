@@ -47,11 +47,11 @@ check-slow: $(SETUP)  ## kills at random moments, two commands at once
 stress: $(SETUP)  ## detection and OpenCV's finders on pictures as cameras spoil them; goes on where it stopped; ARGS="--views 2"
 	$(BIN)/python -m tests.stress $(ARGS)
 
-test-oldest:  ## the library alone, with the oldest NumPy and SciPy that it allows
-	$(call library_tests,numpy==1.26.* scipy==1.11.*)
+test-oldest:  ## the library alone, with the oldest NumPy, SciPy and llvmlite that it allows
+	$(call library_tests,llvmlite==0.45.* numpy==1.26.* scipy==1.11.*)
 
-test-newest:  ## the library alone, with the newest NumPy and SciPy
-	$(call library_tests,numpy scipy)
+test-newest:  ## the library alone, with the newest NumPy, SciPy and llvmlite
+	$(call library_tests,llvmlite numpy scipy)
 
 # OpenCV is what some of the tests compare with.
 define library_tests

@@ -14,8 +14,8 @@ from datasets.errors import UserError
 from datasets.schema import ESTIMATES
 from datasets.store.images import decode_pixels, decode_png
 from datasets.store.nulls import with_nans
-from eposit import Camera, Pose, Solution
-from eposit.arrays import Array
+from eposit import Camera, Pose, Solution, Status
+from eposit.arrays import Array, Mask
 from eposit.lens import COEFFICIENTS
 from render.targets import Target
 
@@ -59,8 +59,18 @@ def estimate_rows(
         "iterations": found.iterations,
         "reprojection_rmse_px": found.reprojection_rmse_px,
         "covariance": list(found.covariance.reshape(b, 36)),
+        "ambiguous": _flags(found.ambiguous, found),
+        "covariance_unreliable": _flags(found.covariance_unreliable, found),
     }
     return table(ESTIMATES, columns)
+
+
+def _flags(values: bool | Mask, found: Solution) -> list[bool | None]:
+    """(b,) flags of the poses; None for failures, and for a solver that tells none, whose flag is one for all."""
+    ok = np.asarray(found.status) == Status.OK
+    if np.ndim(values) == 0:
+        return [None] * len(ok)
+    return [bool(value) if solved else None for value, solved in zip(np.asarray(values), ok, strict=True)]
 
 
 def numbers(rows: pa.Table, *names: str) -> Array:

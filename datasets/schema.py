@@ -138,7 +138,10 @@ KEYPOINTS = pa.schema(
 
 # Columns that older datasets do not have. Where one holds nothing it takes no part in a table's hash, so that a dataset
 # without a world has the hash it always had.
-LATER_COLUMNS = frozenset({"truth", "visible", *MOTION_COLUMNS, *(field.name for field in _world_fields())})
+LATER_COLUMNS = frozenset({
+    "truth", "visible", "ambiguous", "covariance_unreliable", *MOTION_COLUMNS,
+    *(field.name for field in _world_fields()),
+})  # fmt: skip
 
 DETECTIONS = pa.schema(
     [
@@ -160,6 +163,12 @@ DETECTIONS = pa.schema(
     ]
 )
 
+_AMBIGUOUS = _field(
+    "ambiguous",
+    pa.bool_(),
+    "whether another pose is nearly as likely on the same points. Null: no pose, or the solver does not tell",
+)
+
 ESTIMATES = pa.schema(
     [
         *_KEY,
@@ -172,6 +181,12 @@ ESTIMATES = pa.schema(
             "covariance",
             pa.list_(pa.field("element", pa.float64()), 36),
             "6 x 6, row by row: rotation vector on the left in the camera frame, rad; then t, mm. Null: none stated",
+        ),
+        _AMBIGUOUS,
+        _field(
+            "covariance_unreliable",
+            pa.bool_(),
+            "whether the cost is no parabola as the covariance states it. Null: no pose, or the solver does not tell",
         ),
     ]
 )
@@ -217,6 +232,7 @@ SCORES = pa.schema(
             "the paper's star: no solution, or a translation at least twice the true one; where the target is "
             "hidden: a solution",
         ),
+        _AMBIGUOUS,
     ]
 )
 

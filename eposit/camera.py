@@ -28,10 +28,10 @@ class Camera:
     cy: float  # principal point, px
     width: int  # image width, px
     height: int  # image height, px
-    coefficients: tuple[float, ...] = ()  # in the order of eposit.COEFFICIENTS; none for the paper's lenses
+    coefficients: tuple[float, ...] = ()  # in the order of eposit.COEFFICIENTS, in any shape; none for the paper's
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "coefficients", tuple(float(k) for k in self.coefficients))
+        object.__setattr__(self, "coefficients", tuple(float(k) for k in np.ravel(self.coefficients)))
         for name in ("fx", "fy", "width", "height"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0):

@@ -6,12 +6,15 @@ Euler angles are about fixed axes, R = Rz(rz) Ry(ry) Rx(rx). Errors are estimate
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
-from eposit.arrays import Array, Mask, take_last
+from eposit.arrays import Array, Mask
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,14 +41,14 @@ class Pose:
     def quaternion(self) -> Array:
         """(..., 4) unit quaternion w, x, y, z with w >= 0."""
         flat = self.R.reshape(-1, 3, 3)
-        xyzw = Rotation.from_matrix(flat).as_quat(canonical=True)
+        xyzw = _rotation().from_matrix(flat).as_quat(canonical=True)
         return np.roll(xyzw, 1, axis=-1).reshape(*self.R.shape[:-2], 4)
 
     @staticmethod
     def from_quaternion(wxyz: ArrayLike, t: ArrayLike) -> Pose:
         """From (..., 4) quaternions w, x, y, z, normalised here, and (..., 3) positions."""
         quaternion = np.asarray(wxyz, dtype=np.float64)
-        matrices = Rotation.from_quat(np.roll(quaternion.reshape(-1, 4), -1, axis=-1)).as_matrix()
+        matrices = _rotation().from_quat(np.roll(quaternion.reshape(-1, 4), -1, axis=-1)).as_matrix()
         return Pose(matrices.reshape(*quaternion.shape[:-1], 3, 3), np.asarray(t, dtype=np.float64))
 
 
@@ -58,20 +61,11 @@ class PoseBatch:
     iterations: NDArray[np.int64]  # (b,)
     converged: Mask  # (b,)
 
-    def put(self, rows: NDArray[np.int64], other: PoseBatch) -> None:
-        """Overwrite some rows with those of another result; iterations add up."""
-        self.R[..., rows], self.t[:, rows], self.converged[rows] = other.R, other.t, other.converged
-        self.iterations[rows] += other.iterations
-
-    def take(self, rows: NDArray[np.int64]) -> PoseBatch:
-        """Some of the rows."""
-        return PoseBatch(take_last(self.R, rows), take_last(self.t, rows), self.iterations[rows], self.converged[rows])
-
 
 def rotation_from_euler(angles: ArrayLike) -> Array:
     """(..., 3) angles rx, ry, rz in rad to (..., 3, 3) with R = Rz Ry Rx about fixed axes."""
     array = np.asarray(angles, dtype=np.float64)
-    return Rotation.from_euler("xyz", array.reshape(-1, 3)).as_matrix().reshape(*array.shape[:-1], 3, 3)
+    return _rotation().from_euler("xyz", array.reshape(-1, 3)).as_matrix().reshape(*array.shape[:-1], 3, 3)
 
 
 def euler_from_rotation(R: ArrayLike) -> Array:
@@ -86,7 +80,7 @@ def euler_from_rotation(R: ArrayLike) -> Array:
 def rotation_from_vector(vector: ArrayLike) -> Array:
     """(..., 3) rotation vectors, rad, to (..., 3, 3)."""
     array = np.asarray(vector, dtype=np.float64)
-    return Rotation.from_rotvec(array.reshape(-1, 3)).as_matrix().reshape(*array.shape[:-1], 3, 3)
+    return _rotation().from_rotvec(array.reshape(-1, 3)).as_matrix().reshape(*array.shape[:-1], 3, 3)
 
 
 def rotation_error_rad(R_est: ArrayLike, R_true: ArrayLike) -> Array:
@@ -104,7 +98,7 @@ def rotation_error_vector(R_est: ArrayLike, R_true: ArrayLike) -> Array:
     relative = np.asarray(R_est, dtype=np.float64) @ np.swapaxes(np.asarray(R_true, dtype=np.float64), -1, -2)
     finite = np.all(np.isfinite(relative), axis=(-1, -2))
     safe = np.where(finite[..., None, None], relative, np.eye(3))
-    vectors = Rotation.from_matrix(safe.reshape(-1, 3, 3)).as_rotvec().reshape(*relative.shape[:-2], 3)
+    vectors = _rotation().from_matrix(safe.reshape(-1, 3, 3)).as_rotvec().reshape(*relative.shape[:-2], 3)
     return np.where(finite[..., None], vectors, np.nan)
 
 
@@ -118,3 +112,10 @@ def tilt_rad(R: ArrayLike) -> Array:
     """(..., 3, 3) cam_from_obj to the angle, rad, between the object's z axis and the optical axis."""
     array = np.asarray(R, dtype=np.float64)
     return np.arctan2(np.hypot(array[..., 0, 2], array[..., 1, 2]), array[..., 2, 2])
+
+
+def _rotation() -> type[Rotation]:
+    """SciPy's class, loaded by the first who needs it: it takes most of the time that an import of eposit would."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation

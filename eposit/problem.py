@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -10,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from eposit.arrays import Array, Mask
 from eposit.camera import Camera
+from eposit.compiled import layout
 from eposit.refine.weights import whitening
 from eposit.solution import OK, STATUSES, Status
 
@@ -40,6 +43,118 @@ class Problem:
         return self.points_px[..., 0].T, self.points_px[..., 1].T
 
 
+def _numbers(values: ArrayLike) -> Array:
+    """As a contiguous array; NaN where a masked array is masked."""
+    if isinstance(values, np.ma.MaskedArray):
+        values = values.astype(np.float64).filled(np.nan)
+    return np.ascontiguousarray(values, dtype=np.float64)
+
+
+def as_object(points_in_obj: ArrayLike) -> Array:
+    """(n, 3) object points.
+
+    Raises:
+        ValueError: another shape, fewer than four points, or non-finite ones.
+    """
+    obj = _numbers(points_in_obj)
+    if obj.ndim != 2 or obj.shape[1] != 3:
+        raise ValueError(f"points_in_obj has shape {obj.shape}; it must be (n, 3)")
+    if len(obj) < 4:
+        raise ValueError(f"points_in_obj has {len(obj)} points; a pose needs at least 4")
+    if not math.isfinite(obj.sum()) and not np.all(np.isfinite(obj)):
+        raise ValueError("points_in_obj has NaN or infinite coordinates; give finite ones")
+    return obj
+
+
+def as_pixels(points_px: ArrayLike, n: int) -> tuple[Array, bool]:
+    """(b, n, 2) image points, NaN where masked, and whether they were given as a single image.
+
+    Raises:
+        ValueError: another shape.
+    """
+    pixels = _numbers(points_px)
+    if pixels.ndim not in (2, 3) or pixels.shape[-2:] != (n, 2):
+        raise ValueError(f"points_px has shape {pixels.shape}; it must be ({n}, 2) or (b, {n}, 2)")
+    return (pixels[None], True) if pixels.ndim == 2 else (pixels, False)
+
+
+def as_bearings(rays: ArrayLike, points_px: ArrayLike | None, camera: Camera | None, n: int) -> tuple[Array, Camera]:
+    """Bearing vectors, (n, 3) or (b, n, 3), as the image points of BEARINGS, whose residuals are angles, rad.
+
+    Its lens is stereographic: it sees all directions but the backward one, and has one scale at each point.
+
+    Raises:
+        ValueError: another shape, or image points or a camera as well.
+    """
+    if points_px is not None or camera is not None:
+        raise ValueError("solve was given rays and points_px or a camera; give either rays, or points_px and camera")
+    vectors = _numbers(rays)
+    if vectors.ndim not in (2, 3) or vectors.shape[-2:] != (n, 3):
+        raise ValueError(f"rays has shape {vectors.shape}; it must be ({n}, 3) or (b, {n}, 3)")
+    return BEARINGS.project(vectors), BEARINGS
+
+
+BEARINGS = Camera(lens="stereographic", fx=1.0, fy=1.0, cx=0.0, cy=0.0, width=1, height=1)
+EQUAL_WEIGHTS = np.array([[1.0, 0.0, 1.0]])
+
+
+def as_weights(sigma_px: ArrayLike | None, n: int) -> tuple[Array, float]:
+    """Inverse covariances (m, 3) in px^-2 (xx, xy, yy), m = n or 1 for all points, and the variance to divide them by.
+
+    The variance is 0 where sigma is unknown.
+
+    Raises:
+        ValueError: a sigma of another shape, or one that is not positive.
+    """
+    if sigma_px is None:
+        return EQUAL_WEIGHTS, 0.0
+    if isinstance(sigma_px, float | int) and 0.0 < sigma_px < np.inf:
+        return EQUAL_WEIGHTS, float(sigma_px) ** 2
+    sigma = np.asarray(sigma_px, dtype=np.float64)
+    factor = whitening(sigma, n)
+    if sigma.ndim == 0:
+        return EQUAL_WEIGHTS, float(sigma) ** 2
+    return inverse_covariances(factor), 1.0
+
+
+def inverse_covariances(factor: Array) -> Array:
+    """(n, 3) W^T W, as (xx, xy, yy), of (2, 2, n) matrices W as `whitening` gives them."""
+    (a, b), (c, d) = factor
+    return np.stack((a * a + c * c, a * b + c * d, b * b + d * d), axis=-1)
+
+
+LENS_KINDS = {
+    "perspective": layout.PERSPECTIVE,
+    "stereographic": layout.STEREOGRAPHIC,
+    "equidistance": layout.POLYNOMIAL,
+    "equisolid": layout.EQUISOLID,
+    "orthogonal": layout.ORTHOGONAL,
+    "kannala_brandt": layout.POLYNOMIAL,
+    "pinhole_radial": layout.PINHOLE_RADIAL,
+    "eucm": layout.EUCM,
+    "double_sphere": layout.DOUBLE_SPHERE,
+}
+BEYOND = 0.1  # by which the cosine of a point may be below that of the lens's largest angle: noise at the rim
+
+
+@functools.lru_cache(maxsize=256)
+def _header(camera: Camera) -> Array:
+    """The workspace up to the intrinsics."""
+    law, coefficients = camera.law, (*camera.coefficients, 0.0, 0.0, 0.0, 0.0)[:4]
+    least = np.cos(law.theta_max) - BEYOND
+    numbers = (LENS_KINDS[camera.lens], law.theta_max, law.rho_max, least, *coefficients)
+    return np.array((*numbers, camera.fx, camera.fy, camera.cx, camera.cy))
+
+
+def workspace(camera: Camera, n: int) -> Array:
+    """For the compiled solvers: the camera is written, the rest is not."""
+    w = np.empty(layout.POINTS + layout.PER_POINT * n)
+    w[layout.ANGULAR] = 1.0 if camera is BEARINGS else 0.0
+    header = _header(camera)
+    w[: len(header)] = header
+    return w
+
+
 def validate(
     points_in_obj: ArrayLike, points_px: ArrayLike, camera: Camera, sigma_px: ArrayLike | None = None
 ) -> tuple[Problem, bool]:
@@ -48,18 +163,8 @@ def validate(
     Raises:
         ValueError: wrong shapes, fewer than four points, non-finite object points, or an unusable sigma.
     """
-    obj = np.asarray(points_in_obj, dtype=np.float64)
-    pixels = np.asarray(points_px, dtype=np.float64)
-    if obj.ndim != 2 or obj.shape[1] != 3:
-        raise ValueError(f"points_in_obj has shape {obj.shape}; it must be (n, 3)")
-    if len(obj) < 4:
-        raise ValueError(f"points_in_obj has {len(obj)} points; a pose needs at least 4")
-    if not np.all(np.isfinite(obj)):
-        raise ValueError("points_in_obj has NaN or infinite coordinates; give finite ones")
-    if pixels.ndim not in (2, 3) or pixels.shape[-2:] != (len(obj), 2):
-        raise ValueError(f"points_px has shape {pixels.shape}; it must be ({len(obj)}, 2) or (b, {len(obj)}, 2)")
-    single = pixels.ndim == 2
-    pixels = pixels[None] if single else pixels
+    obj = as_object(points_in_obj)
+    pixels, single = as_pixels(points_px, len(obj))
     status = np.full(len(pixels), OK, np.int8)
     if not np.all(np.isfinite(pixels)):
         lost = ~np.all(np.isfinite(pixels), axis=(1, 2))

@@ -13,7 +13,8 @@ from datasets.store.provenance import Provenance
 
 GIT_S = 10.0  # what git may take before the commit counts as unknown
 LIBRARIES = (
-    "numpy", "scipy", "numba", "mitsuba", "drjit", "opencv-python-headless", "OpenEXR", "pyarrow", "poselib",
+    "numpy", "scipy", "llvmlite", "numba", "mitsuba", "drjit", "opencv-python-headless", "OpenEXR", "pyarrow",
+    "poselib",
 )  # fmt: skip
 
 

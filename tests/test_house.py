@@ -34,13 +34,18 @@ def test_help_loads_nothing_heavy():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def test_eposit_needs_numpy_and_scipy_only():
+def test_eposit_needs_numpy_scipy_and_llvmlite_only():
     code = (
         "import sys, eposit\n"
         "ours = {'datasets', 'render', 'pipelines'}\n"
-        "other = (ours | {'mitsuba', 'cv2', 'pyarrow', 'pydantic', 'typer'}) & set(sys.modules)\n"
+        "other = (ours | {'mitsuba', 'cv2', 'pyarrow', 'pydantic', 'typer', 'numba'}) & set(sys.modules)\n"
         "assert not other, other"
     )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_scipy_and_llvm_are_loaded_by_what_needs_them_only():
+    code = "import sys, eposit; assert not {'scipy', 'llvmlite'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
@@ -55,6 +60,7 @@ def test_every_command_has_help_and_an_example(name):
 LONG = {
     "solve": "half of it is the contract that users read",
     "register_sensor": "defines a class inside it: its base is there only once Mitsuba's variant is set",
+    "derivatives": "one pass over the points, with all sums in local variables: a sum in memory would wait for it",
 }
 
 

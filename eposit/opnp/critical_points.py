@@ -16,7 +16,6 @@ from itertools import combinations, combinations_with_replacement
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import qr
 
 from eposit.arrays import Array, solve_or_nan
 
@@ -83,6 +82,8 @@ def tables() -> Tables:
 
 def _chosen(flat: tuple[Array, Array, Array], rows: NDArray[np.int64], minor: NDArray[np.int64]) -> NDArray[np.int64]:
     """Rows of the multiples that pivoting takes first in a random problem; they are independent in almost all."""
+    from scipy.linalg import qr
+
     rng = np.random.default_rng(0)
     A, y = rng.normal(size=(8, 10)), rng.normal(size=4)
     forms = minors(*coefficients(A[None], -(A @ (y[FIRST] * y[SECOND]))[None], *flat[:2]), flat[2])
@@ -187,6 +188,8 @@ def _quick(forms: Array) -> tuple[Array, Array]:
 
 def _thorough(forms: Array) -> tuple[Array, Array]:
     """The same from all multiples and all monomials of degree 7, by orthogonal steps."""
+    from scipy.linalg import qr
+
     fixed, b = tables(), len(forms)
     dual, ratio = np.zeros((b, 165, PAIRS)), np.full((b, PAIRS, PAIRS), np.nan)
     for i, six in enumerate(forms):

@@ -22,7 +22,7 @@ STEPS = 6  # of the least squares at most; half need 2, 99 in 100 up to 5
 AXIS = 1e-4  # least distance from the principal point, relative to the farthest, before the least squares
 ORTHOGONAL = 1e-6  # deviation from a rotation above which the least squares have not arrived
 REPRODUCED_PX2 = 1e-6  # sum of squares above which a root is none: true ones leave rounding, below 1e-12
-ASKEW = rotation_from_vector((0.7, -1.1, 0.4))  # turns the object's axes away from those of its points, any will do
+ASKEW = (0.7, -1.1, 0.4)  # rotation vector that turns the object's axes away from those of its points; any will do
 
 
 def solve(
@@ -71,7 +71,8 @@ def _nothing(offsets: Array) -> CameraCandidates:
 def _candidates(points_in_obj: Array, offsets: Array) -> CameraCandidates:
     """Real solutions of (b, 4, 2) offsets from the principal point."""
     size = np.sqrt(np.mean(np.sum((points_in_obj - points_in_obj[0]) ** 2, axis=1)))
-    obj = (points_in_obj - points_in_obj[0]) @ ASKEW.T / size
+    askew = rotation_from_vector(ASKEW)
+    obj = (points_in_obj - points_in_obj[0]) @ askew.T / size
     w = (offsets[..., 0] + 1j * offsets[..., 1]).T
     scale = np.max(np.abs(w), axis=0)
     w = w / np.where(scale > 0.0, scale, 1.0)
@@ -88,8 +89,8 @@ def _candidates(points_in_obj: Array, offsets: Array) -> CameraCandidates:
     minima = damped_gauss_newton(partial(_model, dual, seen), unknowns, STEPS)
     k = minima.x[4]
     pose, f, sound = _poses(dual, seen, minima.x[:4].T, k)
-    t = pose.t * size - (pose.R @ ASKEW) @ points_in_obj[0]
-    rows, pose = image[sound], Pose((pose.R @ ASKEW)[sound], t[sound])
+    t = pose.t * size - (pose.R @ askew) @ points_in_obj[0]
+    rows, pose = image[sound], Pose((pose.R @ askew)[sound], t[sound])
     f_px, k_per_px2 = f[sound] * scale[rows], k[sound] / scale[rows] ** 2
     return table(SOLUTIONS, rows, len(offsets), pose, f_px, k_per_px2, minima.take(sound))
 

@@ -41,17 +41,6 @@ def factorise(normal: Array, damping: Array | float = 0.0) -> Factor:
     return Factor(upper, pivots, least)
 
 
-def solve(factor: Factor, right: Array) -> Array:
-    """(6, b) solutions of N x = right."""
-    x = right.copy()
-    for i in range(5):
-        x[i + 1 :] -= factor.upper[i, i + 1 :] * x[i]
-    x *= factor.pivots
-    for i in range(4, -1, -1):
-        x[i] -= np.einsum("jb,jb->b", factor.upper[i, i + 1 :], x[i + 1 :])
-    return x
-
-
 def inverse(factor: Factor) -> Array:
     """(6, 6, b) inverses; NaN where there is none."""
     b = factor.pivots.shape[1]

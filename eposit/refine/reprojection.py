@@ -10,9 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from eposit.arrays import Array, take_last
+from eposit.arrays import Array
 from eposit.camera import Camera
 
 
@@ -37,19 +36,9 @@ class Observations:
         diagonal = None if crossed else np.ascontiguousarray(factor[:, [0, 1], [0, 1]])[..., None]
         return Observations(camera, points_in_obj, seen, factor, diagonal)
 
-    def take(self, rows: NDArray[np.int64]) -> Observations:
-        """Some of the images."""
-        return replace(self, seen=take_last(self.seen, rows))
-
     def whiten(self, values: Array) -> Array:
         """Whitened px of (n, 2, b) values."""
         return values * self.diagonal if self.diagonal is not None else np.einsum("nac,ncb->nab", self.factor, values)
-
-    def weigh(self, values: Array) -> Array:
-        """The transpose of `whiten` after it: what its square weighs."""
-        if self.diagonal is not None:
-            return values * self.diagonal**2
-        return np.einsum("nca,ncd,ndb->nab", self.factor, self.factor, values, optimize=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,38 +50,10 @@ class Equations:
     normal: Array  # (6, 6, b) J^T J, upper triangle
 
 
-def residuals(view: Observations, R: Array, t: Array) -> Array:
-    """(n, 2, b) whitened residuals, projection minus observation; not finite where a point cannot be projected."""
-    point = np.einsum("nj,ijb->nib", view.points_in_obj, R)
-    point += t
-    point[:, :2] *= _radial(view.camera, point, False)[0][:, None]
-    return view.whiten(point[:, :2] - view.seen)
-
-
 def cost(residual: Array) -> Array:
     """(b,) sums of the squares of (n, 2, b) residuals; infinite where they are not finite."""
     total = np.einsum("nab,nab->b", residual, residual)
     return np.where(np.isfinite(total), total, np.inf)
-
-
-def gradient(view: Observations, R: Array, t: Array) -> Array:
-    """(6, b) J^T r, without forming J."""
-    arm = np.einsum("nj,ijb->nib", view.points_in_obj, R)
-    point = arm + t
-    scale, forward, bend = _radial(view.camera, point, True)
-    side = point[:, :2]
-    pull = view.weigh(side * scale[:, None] - view.seen)
-    along = np.einsum("nab,nab->nb", side, pull)
-    force = np.empty_like(arm)
-    np.multiply(scale[:, None], pull, out=force[:, :2])
-    np.multiply(forward, along, out=force[:, 2])
-    if bend is not None:
-        force[:, :2] += (bend * along)[:, None] * side
-    result = np.empty((6, t.shape[1]))
-    np.add.reduce(force, axis=0, out=result[3:])
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        np.add.reduce(arm[:, j] * force[:, k] - arm[:, k] * force[:, j], axis=0, out=result[i])
-    return result
 
 
 def equations(view: Observations, R: Array, t: Array) -> Equations:
@@ -100,7 +61,7 @@ def equations(view: Observations, R: Array, t: Array) -> Equations:
     arm = np.einsum("nj,ijb->nib", view.points_in_obj, R)
     n, _, b = arm.shape
     point = arm + t
-    scale, forward, bend = _radial(view.camera, point, True)
+    scale, forward, bend = _radial(view.camera, point)
     side = point[:, :2]
     residual = view.whiten(side * scale[:, None] - view.seen)
     jacobian = np.empty((n, 2, 6, b))
@@ -151,7 +112,7 @@ def _fill_slopes(view: Observations, out: Array, side: Array, scale: Array, forw
     out[:, 0, 0], out[:, 1, 1] = wide * (scale + x * x * bend), high * (scale + y * y * bend)
 
 
-def _radial(camera: Camera, point: Array, slopes: bool) -> tuple[Array, Array, Array | None]:
+def _radial(camera: Camera, point: Array) -> tuple[Array, Array, Array | None]:
     """The projection x scale, y scale of (n, 3, b) points and its derivatives, each (n, b).
 
     They are scale I + bend (x, y) (x, y)^T by x and y, and forward (x, y) by z; bend is None where it is zero. The
@@ -162,7 +123,7 @@ def _radial(camera: Camera, point: Array, slopes: bool) -> tuple[Array, Array, A
         scale = 1.0 / z
         if not np.all(z > 0.0):  # nothing lies at or beyond 90 degrees
             scale = np.where(z > 0.0, scale, np.inf)
-        return scale, -scale * scale if slopes else scale, None
+        return scale, -scale * scale, None
     law = camera.law
     side2 = x * x + y * y
     side = np.sqrt(side2)
@@ -172,8 +133,6 @@ def _radial(camera: Camera, point: Array, slopes: bool) -> tuple[Array, Array, A
     on_axis = side == 0.0
     scale = np.where(on_axis, law.raw_slope(np.zeros(())) / z, law.raw_rho(theta) / np.where(on_axis, 1.0, side))
     scale = np.where(np.isnan(scale), np.inf, scale)
-    if not slopes:
-        return scale, scale, None
     forward = -law.raw_slope(theta) / (side2 + z * z)
     bend = np.where(on_axis, 0.0, -(forward * z + scale) / np.where(on_axis, 1.0, side2))
     return scale, forward, bend

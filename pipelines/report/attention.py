@@ -63,6 +63,9 @@ def _failures(item: Series) -> Iterator[str]:
     if np.any(wrong):
         told = f"{item.name} gave {counted(int(wrong.sum()), 'pose')} as ok whose position is wrong by its own length"
         yield f"{told} or more: frames {_listed(sorted(set(item.frame_id[wrong].tolist())))}"
+    if np.any(item.ambiguous):
+        told = f"{item.name} says of {counted(int(item.ambiguous.sum()), 'pose')} that the points allow another as well"
+        yield f"{told}: frames {_listed(sorted(set(item.frame_id[item.ambiguous].tolist())))}"
 
 
 def _biased(run: Run, item: PointErrors) -> Iterator[str]:

@@ -44,6 +44,7 @@ class Series:
     normalised: Array  # (n, 6) errors over their stated standard deviations, NaN without
     status: NDArray[np.str_]  # HIDDEN where no pose could be found, as the target cannot be seen
     gross: Mask
+    ambiguous: Mask  # poses of which the solver says that another is nearly as likely
 
     @property
     def failed(self) -> Mask:
@@ -76,6 +77,7 @@ class Cell:
     n: int  # estimates: frames times draws
     failed: int
     gross: int
+    ambiguous: int
     failed_rate: Interval
     gross_rate: Interval
     rotation_deg: Interval | None  # medians of absolute errors, None if all failed
@@ -93,10 +95,13 @@ def series(scores: pa.Table) -> list[Series]:
         errors = dict(zip(ERRORS, numbers(part, *ERRORS).T, strict=True))
         outcome = zip(part["status"].to_pylist(), part["failure_reason"].to_pylist(), strict=True)
         status = np.array([HIDDEN if reason == HIDDEN else status for status, reason in outcome], str)
-        gross = np.array(part["gross_failure"].to_pylist())
+        gross, ambiguous = (
+            np.array([bool(value) for value in part[name].to_pylist()], bool) for name in ("gross_failure", "ambiguous")
+        )
         normalised = numbers(part, *(f"{component}_normalised" for component in COMPONENTS))
         named: dict[str, str] = dict(zip(SETTING, key, strict=True))
-        found.append(Series(" ".join(key), named, part["frame_id"].to_numpy(), errors, normalised, status, gross))
+        frame_id = part["frame_id"].to_numpy()
+        found.append(Series(" ".join(key), named, frame_id, errors, normalised, status, gross, ambiguous))
     return found
 
 
@@ -143,6 +148,7 @@ def _cell(item: Series, camera: str, by_frame: NDArray[np.intp]) -> Cell:
         by_frame.size,
         int(failed.sum()),
         int(gross.sum()),
+        int(item.ambiguous[by_frame].sum()),
         rate(failed),
         rate(gross),
         _median(errors["rotation_error_deg"]) if solved else None,

@@ -8,7 +8,7 @@ import pytest
 from datasets.trajectories.helix import Helix
 from eposit import Camera, Pose, pnpfr
 from eposit.pnpfr.polynomials import dual_basis, solve_roots
-from eposit.pose import euler_error_rad, rotation_error_rad
+from eposit.pose import euler_error_rad, rotation_error_rad, rotation_from_vector
 from tests.cameras import PAPER_OBJECT, paper_camera, random_object, random_pose
 
 # Of this camera a solver may look at the principal point and the aspect only: its focal length and lens are wrong.
@@ -69,7 +69,7 @@ def frame(rng, count=1):
     points = random_object(rng)
     pixels = np.stack([problem(rng, points)[4] for _ in range(count)], axis=1)
     w = (pixels - (790.0, 620.0)) @ (1.0, 1j / 1.01)
-    return (points - points[0]) / 200.0 @ pnpfr.ASKEW.T, w / np.max(np.abs(w), axis=0)
+    return (points - points[0]) / 200.0 @ rotation_from_vector(pnpfr.ASKEW).T, w / np.max(np.abs(w), axis=0)
 
 
 def test_twelve_solutions():

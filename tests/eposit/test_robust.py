@@ -6,10 +6,6 @@ import pytest
 import eposit
 from eposit import Pose
 from eposit.pose import rotation_error_vector, rotation_from_vector
-from eposit.refine.weights import whitening
-from eposit.robust import TRIANGLES, _trimmed, _trimmed_sum
-from eposit.robust.ray_residuals import distances, fit, ray_observations
-from eposit.robust.triangle_design import spread_triangles
 from tests.cameras import paper_camera
 
 SIGMA = 0.4
@@ -129,33 +125,6 @@ def test_sigma_of_each_point_goes_with_its_point():
     np.testing.assert_allclose(solution.cam_from_obj.t[0], alone.cam_from_obj.t[0], rtol=1e-12)
 
 
-def test_distances_from_a_pose_are_those_of_points_that_took_no_part():
-    """For each point, in the fit or not, the distance has the mean of two squared normal values: 2.
-
-    Six points give the pose, so half of their residuals' variance went into it, and the other two miss by that much
-    more: a residual alone would have a mean of 1 for those in the fit, and more than 2 for those outside.
-    """
-    camera, pose, pixels = images(EIGHT, "equisolid", 2000, 10)
-    view = ray_observations(EIGHT, pixels, camera, whitening(np.asarray(SIGMA), 8), True)
-    chosen = np.broadcast_to(np.arange(8)[:, None] < 6, (8, 2000))
-    true = np.ascontiguousarray(pose.R.transpose(1, 2, 0)), np.ascontiguousarray(pose.t.T)
-    mean = np.mean(distances(view, chosen, *fit(view, chosen, true)), axis=1)
-    # The mean of 2000 such values is good to 2 / sqrt(2000) = 0.045; 0.2 is four of those and the noise's second order.
-    np.testing.assert_allclose(mean, 2.0, atol=0.2)
-
-
-def test_the_start_of_the_search_is_a_minimum_of_the_trimmed_squares():
-    """Another fit to its own points gains nothing; from the best triangle alone it would gain half of the sum."""
-    camera, _, pixels = images(EIGHT, "equisolid", 200, 11)
-    spoilt, _ = spoil(pixels, 12, False)
-    view = ray_observations(EIGHT, spoilt, camera, whitening(None, 8), False)
-    pose, chosen = _trimmed(view, spread_triangles(EIGHT, TRIANGLES))
-    assert np.all(np.sum(chosen, axis=0) == view.least)
-    before, after = _trimmed_sum(view, *pose), _trimmed_sum(view, *fit(view, chosen, pose))
-    # Three rounds of two steps leave 1e-6 of the sum where the choice of points has settled: in nearly all images.
-    assert np.mean(after > (1.0 - 1e-3) * before) > 0.9
-
-
 def test_fewer_than_eight_points_is_a_sentence():
     with pytest.raises(ValueError, match=r"7 points.*8 or more.*leave robust out"):
         eposit.solve(EIGHT[:7], np.zeros((7, 2)), paper_camera("equisolid"), robust=True)
@@ -165,13 +134,3 @@ def test_points_on_a_line_have_a_status():
     line = np.arange(8.0)[:, None] * (10.0, 20.0, 5.0)
     camera = paper_camera("equisolid")
     assert eposit.solve(line, camera.project(line + (0.0, 0.0, 900.0)), camera, robust=True).status == "coplanar"
-
-
-def test_two_wrong_points_leave_triangles():
-    """Every pair of points is avoided by three triangles or more, however the board is cut."""
-    for points in (EIGHT, BOARD[:20], BOARD):
-        triangles = spread_triangles(points, TRIANGLES)
-        assert len(triangles) == TRIANGLES
-        for i in range(len(points)):
-            for j in range(i):
-                assert sum(i not in three and j not in three for three in triangles) >= 3

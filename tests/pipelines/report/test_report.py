@@ -81,7 +81,7 @@ def _series(n, draws, values):
     errors = {column: np.repeat(values, draws) for column in ERRORS}
     frame = np.repeat(np.arange(n), draws)
     status, never = np.full(len(frame), "ok"), np.zeros(len(frame), bool)
-    return Series("x", {}, frame, errors, np.full((len(frame), 6), np.nan), status, never)
+    return Series("x", {}, frame, errors, np.full((len(frame), 6), np.nan), status, never, never)
 
 
 def test_draws_of_one_frame_stay_together_in_the_intervals():

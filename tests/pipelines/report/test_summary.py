@@ -40,7 +40,7 @@ def _scores(seed, key=("best", "detected", "exact", "all")):
     named = dict(zip(("solver", "point_source", "assumed_camera", "point_set"), key, strict=True))
     frame_id = np.array([frame["frame_id"] for frame in FRAMES])
     normalised = rng.standard_normal((n, 6))
-    return Series(" ".join(key), named, frame_id, errors, normalised, np.full(n, "ok", "U20"), np.zeros(n, bool))
+    return Series(" ".join(key), named, frame_id, errors, normalised, np.full(n, "ok", "U20"), *np.zeros((2, n), bool))
 
 
 def _run(seed=0):
@@ -115,6 +115,12 @@ def _failing(run):
     return replace(run, found=[replace(item, status=status, gross=gross)])
 
 
+def _ambiguous(run):
+    flags = np.zeros(len(run.found[0].status), bool)
+    flags[[2, 6]] = True
+    return replace(run, found=[replace(run.found[0], ambiguous=flags)])
+
+
 def _wrong_poses(run):
     return replace(run, found=[replace(run.found[0], normalised=1.6 * run.found[0].normalised)])
 
@@ -134,6 +140,7 @@ def _wrong_poses(run):
                 "best detected exact all gave 1 pose as ok whose position is wrong by its own length or more: frames ",
             ],
         ),
+        (_ambiguous, ["best detected exact all says of 2 poses that the points allow another as well: frames "]),
         (_wrong_poses, ["poses of best detected exact all are off by 1."]),
     ],
     ids=lambda item: item.__name__ if callable(item) else "",

@@ -11,7 +11,7 @@ import pytest
 import eposit
 from datasets.errors import UserError
 from datasets.recipe.model import load_recipe
-from datasets.rows import points_by_frame, pose_columns, poses
+from datasets.rows import estimate_rows, points_by_frame, pose_columns, poses
 from datasets.store.dataset import Dataset
 from pipelines.stages.estimate import _noise, solve_with
 from pipelines.stages.settings import Setting
@@ -163,3 +163,29 @@ def test_a_stored_covariance_is_that_of_six_components(tiny):
     # The depth is what a camera tells worst.
     assert stored[5, 5] > stored[3, 3]
     assert stored[5, 5] > stored[4, 4]
+
+
+def test_what_the_solver_says_about_its_poses_is_kept_and_null_where_it_says_nothing():
+    """A far square marker: about every fourth pose is ambiguous; one image is unusable."""
+    marker = np.array([(-50.0, -50.0, 0.0), (50.0, -50.0, 0.0), (50.0, 50.0, 0.0), (-50.0, 50.0, 0.0)])
+    rng, camera = np.random.default_rng(3), paper_camera("equisolid")
+    pixels = camera.project(marker + (100.0, 50.0, 2000.0)) + 0.2 * rng.normal(size=(20, 4, 2))
+    pixels[7] = np.nan
+    key = ("best", "detected", "exact", "all")
+    found = eposit.solve(marker, pixels, camera, sigma_px=0.2)
+    rows = estimate_rows(range(20), [0] * 20, key, found, 4)
+    for name in ("ambiguous", "covariance_unreliable"):
+        kept = rows[name].to_pylist()
+        assert kept[7] is None
+        assert kept[:7] + kept[8:] == np.delete(getattr(found, name), 7).tolist()
+    assert 0 < sum(flag is True for flag in rows["ambiguous"].to_pylist()) <= 19
+    linear = eposit.solve(PAPER_OBJECT, camera.project(PAPER_OBJECT + (0.0, 0.0, 2000.0))[None], camera, "eposit")
+    told = estimate_rows([0], [0], key, linear, 4)
+    assert (told["ambiguous"].to_pylist(), told["covariance_unreliable"].to_pylist()) == ([None], [None])
+
+
+def test_the_scores_keep_what_is_ambiguous(tiny):
+    for path in (tiny[1] / "scores").glob("best-*"):
+        told = pq.read_table(path)["ambiguous"].to_pylist()
+        assert told == pq.read_table(tiny[1] / "estimates" / path.name)["ambiguous"].to_pylist()
+        assert None not in told

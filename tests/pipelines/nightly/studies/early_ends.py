@@ -9,7 +9,7 @@ from datasets.plan import plan
 from eposit.pose import rotation_error_vector
 from tests.pipelines.nightly.studies.pool import REGIMES, recipe_of
 from tests.pipelines.nightly.studies.reading import ALL, FOUR, NOISE_PX, NOISY
-from tests.pipelines.nightly.studies.steps import earlier, recorded
+from tests.pipelines.nightly.studies.steps import earlier
 
 
 def moves(pool, steps, seed=0):
@@ -34,11 +34,10 @@ def moves(pool, steps, seed=0):
 
 
 def _moves(points_in_obj, points_px, camera, sigma_px, steps):
-    with recorded() as passed:
-        solution = eposit.solve(points_in_obj, points_px[None], camera, sigma_px=sigma_px)
+    problem = points_in_obj, points_px[None], camera
+    solution = eposit.solve(*problem, sigma_px=sigma_px)
     end, found = solution.cam_from_obj, []
-    for _ in range(steps):
-        solution = earlier(solution, passed, 1)
-        here = solution.cam_from_obj
+    for count in range(1, steps + 1):
+        here = earlier(solution, count, *problem, sigma_px).cam_from_obj
         found.append(np.hstack((rotation_error_vector(here.R, end.R)[0], (here.t - end.t)[0])))
     return np.array(found)

@@ -1,44 +1,40 @@
-"""The poses that the solver passed on its way: what it would have returned, had it stopped earlier."""
+"""What a solver would return that stops some steps before the end: Gauss-Newton's way to the pose."""
 
 from __future__ import annotations
 
 import dataclasses
-from contextlib import contextmanager
-from unittest import mock
 
 import numpy as np
 
+import eposit
 from eposit import Pose
-from eposit.refine import minimise
+from eposit.pose import rotation_from_vector
+from eposit.refine.weights import normal_equations, whitening
+
+ENDED = 1e-12  # rad and relative translation of a step that changes nothing any more
+MOST = 50
 
 
-@contextmanager
-def recorded():
-    """While the body runs, every step of the refinement: pose before and after, R (3, 3, b) and t (3, b)."""
-    steps, real = [], minimise.moved
+def earlier(solution, count, points_in_obj, points_px, camera, sigma_px):
+    """A solution of one image, (1, n, 2) px, with the pose of `count` steps before its last, or the first one.
 
-    def moved(R, t, move):
-        after = real(R, t, move)
-        steps.append(((R, t), after))
-        return after
-
-    with mock.patch.object(minimise, "moved", moved):
-        yield steps
-
-
-def earlier(solution, steps, count):
-    """A solution of one image with the pose of `count` steps before its last, or the first one if it took fewer."""
-    R, t = solution.cam_from_obj.R[0], solution.cam_from_obj.t[0]
-    for _ in range(count):
-        R, t = _before(R, t, steps)
-    return dataclasses.replace(solution, cam_from_obj=Pose(R[None], t[None]))
+    The way begins at the best start and is taken with J^T J, as ours is while its steps are long.
+    """
+    start = eposit.solve(points_in_obj, points_px, camera, sigma_px=sigma_px, refine=False).cam_from_obj
+    way = [start]
+    weights = whitening(None if sigma_px is None else np.asarray(sigma_px, float), len(points_in_obj))
+    for _ in range(MOST):
+        following, size = _step(way[-1], points_in_obj, points_px, camera, weights)
+        if not size > ENDED:
+            break
+        way.append(following)
+    pose = way[max(0, len(way) - 1 - count)]
+    return dataclasses.replace(solution, cam_from_obj=pose)
 
 
-def _before(R, t, steps):
-    for (R_before, t_before), (R_after, t_after) in reversed(steps):
-        if np.any(same := np.all(R_after == R[..., None], axis=(0, 1)) & np.all(t_after == t[:, None], axis=0)):
-            column = int(np.argmax(same))
-            found = R_before[..., column].copy(), t_before[..., column].copy()
-            if not (np.array_equal(found[0], R) and np.array_equal(found[1], t)):
-                return found
-    return R, t
+def _step(pose, points_in_obj, points_px, camera, weights):
+    u, v = points_px[..., 0].T, points_px[..., 1].T
+    normal, gradient = normal_equations(camera, points_in_obj, u, v, pose.R, pose.t, weights)
+    move = -np.linalg.solve(normal, gradient[..., None])[..., 0]
+    size = max(np.linalg.norm(move[0, :3]), np.linalg.norm(move[0, 3:]) / np.linalg.norm(pose.t[0]))
+    return Pose(rotation_from_vector(move[:, :3]) @ pose.R, pose.t + move[:, 3:]), size
