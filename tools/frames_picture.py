@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from datasets.rows import decode_image
 from datasets.store.dataset import Dataset, open_dataset
+from eposit.arrays import Array
 from pipelines.commands.stages import ROOM
 from pipelines.detection import Detector
 from pipelines.pages.frames import Crop, crops, marks_by_frame
@@ -52,7 +53,7 @@ def boards(dataset: Dataset) -> list[Image]:
     return [_marked(shown[frame], marks[frame].points_px) for frame in chosen]
 
 
-def _marked(crop: Crop, points: NDArray[np.float64]) -> Image:
+def _marked(crop: Crop, points: Array) -> Image:
     image = np.repeat(crop.image[..., None], 3, axis=2) if crop.image.ndim == 2 else crop.image.copy()
     radius = round(POINT_SHARE * max(image.shape))
     for i, (x, y) in enumerate(points - crop.corner):

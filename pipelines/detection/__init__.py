@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eposit.arrays import Array
-from pipelines.detection.circle import find_circle
+from pipelines.detection.board_map import grid
+from pipelines.detection.circle import find_circle, misfit_squares
 from pipelines.detection.consistency import Corners, check_placed, too_many_bad
 from pipelines.detection.corner_sites import chessboard_sites
 from pipelines.detection.corners import refine_corners
@@ -102,7 +103,8 @@ def _detect_chessboard(image: Grey, target: Chessboard, detector: str) -> Detect
         return _nothing(count, PointStatus.CORNERS_INCONSISTENT, seen.finder)
     if too_many_bad(corners.consistent):
         return _nothing(count, PointStatus.CORNERS_INCONSISTENT, seen.finder)
-    circle = find_circle(image, corners.board, corners.blur_px, corners.contrast, target)
+    misfit = misfit_squares(corners, grid(target.inner)[seen.ids])
+    circle = find_circle(image, corners.board, corners.blur_px, corners.contrast, target, misfit)
     points, covariance = np.full((count, 2), np.nan), np.full((count, 2, 2), np.nan)
     status = np.full(count, PointStatus.POINT_NOT_FOUND, STATUS_TYPE)
     status[seen.ids] = np.where(corners.consistent, PointStatus.OK, PointStatus.CORNERS_INCONSISTENT)

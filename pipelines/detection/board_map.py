@@ -95,10 +95,10 @@ class BoardMap:
         powers = share[..., None] ** np.arange(1.0, 5.0)
         return np.linalg.solve(powers, height[..., None])[..., 1:, 0] / reach_px[:, None, None] ** np.arange(2.0, 5.0)
 
-    def slopes(self, at: Array) -> Array:
-        """(m, 2, 13) change of the pixels for a change of each of the map's parameters."""
+    def slopes(self, at: Array, height: float = 0.0) -> Array:
+        """(m, 2, 13) change of the pixels, `height` squares above the board, for one of each parameter."""
         out = np.empty((2 * len(at), generic_lens.PARAMETERS))
-        x, y, z = _in_space(at, 0.0, self.lift)
+        x, y, z = _in_space(at, height, self.lift)
         generic_lens.slopes(self.R, self.t, self.lens, x, y, z, out)
         return out.reshape(-1, 2, generic_lens.PARAMETERS)
 

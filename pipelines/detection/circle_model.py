@@ -21,15 +21,20 @@ from pipelines.detection.erf import GAUSS, decay, signed_share
 from pipelines.detection.kernels import compiled
 
 Places = NDArray[np.intp]
-# Numbers of a fit, in order: disc x, y, in radii from where it is expected, and its size as a ratio; shadow x, y from
-# the foot and the softness of its rim, in radii; then k, w, gx, gy (per radius), A, L in grey values.
-SHAPE, LINEAR = 6, 6
-SIZE, SHADOW, SOFTNESS = 2, slice(3, 5), 5
-DISC_GREY, WHITE_GREY, BLOCKED, LAMP = 6, 7, 10, 11
-FURTHEST_STEP = np.array([0.15, 0.15, 0.02, 0.15, 0.15, 0.05])  # in one iteration
+# Numbers of a fit, in order: disc x, y, in radii from where it is expected, its size as a ratio, and by how much it is
+# longer along x than along y and along one diagonal than along the other, as shares; shadow x, y from the foot and the
+# softness of its rim, in radii; then k, w, gx, gy (per radius), A, L in grey values.
+SHAPE, LINEAR = 8, 6
+SIZE, OBLONG, SHADOW, SOFTNESS = 2, slice(3, 5), slice(5, 7), 7
+DISC_GREY, WHITE_GREY, BLOCKED, LAMP = 8, 9, 12, 13
+MOVES = 5  # numbers that move the disc
+SECTORS = 12  # of the disc's surroundings, whose residuals are held against each other
+USUAL_SCATTER = 1.5  # of these over the noise: a picture that the model explains stays below
+FURTHEST_STEP = np.array([0.15, 0.15, 0.02, 0.02, 0.02, 0.15, 0.15, 0.05])  # in one iteration
 SOFTNESS_LIMITS = (0.01, 0.6)
 ROUNDING = 1.0 / 12.0  # variance of a grey value that was rounded: no picture is better known
 STEPS = 60
+START_NOISE = 4.0  # variance, grey values^2, before any is known
 STOP = 0.5  # step, in standard deviations of what is fitted, at which a fit has converged; it is still made
 
 
@@ -54,9 +59,9 @@ class Patch:
 class Prior:
     """What is known before the pixels are looked at."""
 
-    start: Array  # (6,) shape to start from
-    mean: Array  # (12,)
-    spread: Array  # (12,) standard deviations
+    start: Array  # (8,) shape to start from
+    mean: Array  # (14,)
+    spread: Array  # (14,) standard deviations
     furthest_shadow: float  # radii
 
 
@@ -64,9 +69,10 @@ class Prior:
 class DiscFit:
     """The fit of one disc."""
 
-    values: Array  # (12,)
-    covariance: Array  # (12, 12)
+    values: Array  # (14,)
+    covariance: Array  # (14, 14)
     converged: bool
+    residual: float  # mean square, grey values^2
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,21 +82,22 @@ class _Picture:
     opened: Array  # (h, w) share of a fine cell that the disc leaves open
     shade: Array  # (h, w) share of the lamp that is hidden
     basis: Array  # (n, 6) pixels for a change of the linear numbers
-    rim: Array  # (3, h, w) change of `opened` with the disc's x, y and size
+    rim: Array  # (5, h, w) change of `opened` with the disc's x, y, size and form
     edge: Array  # (3, h, w) change of `shade` with its x, y and softness
 
 
 @compiled
 def _open_share(v: Array, p: Array, per_px: Array, finer: int) -> tuple[Array, Array]:
-    """Share of each fine cell that the disc leaves open, and its change with the disc's x, y and size (3, h, w).
+    """Share of each fine cell that the disc leaves open, and its change with the disc's x, y, size and form (5, h, w).
 
     v: (2, h, w) places on its plane, radii from its centre.
     """
     _, height, width = v.shape
-    out, slopes = np.empty((height, width)), np.empty((3, height, width))
+    out, slopes = np.empty((height, width)), np.empty((5, height, width))
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
-            a, b = v[0, i, j] - p[0], v[1, i, j] - p[1]
+            u, w = v[0, i, j] - p[0], v[1, i, j] - p[1]
+            a, b = u * (1.0 - p[3]) - w * p[4], w * (1.0 + p[3]) - u * p[4]
             radius = math.sqrt(a * a + b * b) + 1e-12
             across = (per_px[0, 0] * a + per_px[1, 0] * b) / radius
             down = (per_px[0, 1] * a + per_px[1, 1] * b) / radius
@@ -100,6 +107,7 @@ def _open_share(v: Array, p: Array, per_px: Array, finer: int) -> tuple[Array, A
             out[i, j] = 0.5 + beyond if inside else 0.0 if beyond < 0.0 else 1.0
             slope = -per_radius if inside else 0.0
             slopes[0, i, j], slopes[1, i, j], slopes[2, i, j] = slope * a / radius, slope * b / radius, slope
+            slopes[3, i, j], slopes[4, i, j] = slope * (a * u - b * w) / radius, slope * (a * w + b * u) / radius
     return out, slopes
 
 
@@ -113,12 +121,12 @@ def _shadow(u: Array, p: Array) -> tuple[Array, Array]:
     out, slopes = np.empty((height, width)), np.empty((3, height, width))
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
-            a, b = u[0, i, j] - p[3], u[1, i, j] - p[4]
+            a, b = u[0, i, j] - p[5], u[1, i, j] - p[6]
             radius = math.sqrt(a * a + b * b) + 1e-12
-            beyond = (radius - 1.0) / p[5]
+            beyond = (radius - 1.0) / p[7]
             bell = decay(0.5 * beyond * beyond)
             out[i, j] = 0.5 - 0.5 * signed_share(beyond, bell)
-            slope = 0.5 * GAUSS * bell / p[5]
+            slope = 0.5 * GAUSS * bell / p[7]
             slopes[0, i, j], slopes[1, i, j], slopes[2, i, j] = slope * a / radius, slope * b / radius, slope * beyond
     return out, slopes
 
@@ -158,7 +166,8 @@ def fit_disc(patch: Patch, prior: Prior) -> DiscFit:
     values, trial = np.zeros(SHAPE + LINEAR), np.zeros(SHAPE + LINEAR)
     trial[:SHAPE] = prior.start
     normal, right = np.eye(len(values)), np.zeros(len(values))
-    cost, damping, noise = np.inf, 1e-3, 4.0
+    jacobian, best = np.zeros((len(patch.grey), len(values))), np.zeros(len(patch.grey))
+    cost, damping, noise = np.inf, 1e-3, START_NOISE
     for _ in range(STEPS):
         picture = _draw(patch, trial)
         weigh = noise / prior.spread**2
@@ -167,7 +176,7 @@ def fit_disc(patch: Patch, prior: Prior) -> DiscFit:
         if residual @ residual + np.sum(weigh * (trial - prior.mean) ** 2) > cost:
             damping *= 10.0
         else:
-            values, damping = trial.copy(), max(0.1 * damping, 1e-9)
+            values, best, damping = trial.copy(), residual, max(0.1 * damping, 1e-9)
             jacobian = np.column_stack((_moves(patch, picture, values), picture.basis))
             noise = _noise(jacobian, residual)
             weigh = noise / prior.spread**2
@@ -179,12 +188,25 @@ def fit_disc(patch: Patch, prior: Prior) -> DiscFit:
         step = np.linalg.solve(damped, right)
         if right @ step <= STOP * STOP * noise:
             values[:SHAPE] += step[:SHAPE]
-            return DiscFit(values, np.linalg.inv(normal) * noise, True)
+            covariance = np.linalg.inv(normal) * noise
+            return DiscFit(
+                values,
+                covariance * _unexplained(patch, jacobian, best, covariance),
+                True,
+                float(best @ best / len(best)),
+            )
         trial = values.copy()
         trial[:SHAPE] += np.clip(step[:SHAPE], -FURTHEST_STEP, FURTHEST_STEP)
         trial[SHADOW] = np.clip(trial[SHADOW], -prior.furthest_shadow, prior.furthest_shadow)
         trial[SOFTNESS] = np.clip(trial[SOFTNESS], *SOFTNESS_LIMITS)
-    return DiscFit(values, np.linalg.inv(normal) * noise, False)
+    return DiscFit(values, np.linalg.inv(normal) * noise, False, float(best @ best / len(best)))
+
+
+def cost_of(patch: Patch, prior: Prior, shape: Array) -> float:
+    """Sum of squared residuals, grey values, of the picture of a shape (8,) with its best grey values."""
+    picture, weigh = _draw(patch, shape), START_NOISE / prior.spread[SHAPE:] ** 2
+    residual = patch.grey - picture.basis @ _best_levels(picture.basis, patch.grey, weigh, prior.mean[SHAPE:])
+    return float(residual @ residual)
 
 
 def _draw(patch: Patch, shape: Array) -> _Picture:
@@ -205,7 +227,7 @@ def _best_levels(basis: Array, grey: Array, weigh: Array, mean: Array) -> Array:
 
 
 def _moves(patch: Patch, picture: _Picture, values: Array) -> Array:
-    """(n, 6) change of the pixels for a change of the shape."""
+    """(n, 8) change of the pixels for a change of the shape."""
     gx, gy = values[WHITE_GREY + 1 : BLOCKED]
     under = values[WHITE_GREY] - values[DISC_GREY] + gx * patch.slope_x + gy * patch.slope_y
     under -= values[BLOCKED] * patch.blocked + values[LAMP] * picture.shade
@@ -219,6 +241,25 @@ def _noise(jacobian: Array, residual: Array) -> float:
     n, numbers = jacobian.shape
     weight = jacobian[:, 0] ** 2 + jacobian[:, 1] ** 2
     return max(np.sum(weight * residual**2) / max(np.sum(weight), 1e-300) * n / (n - numbers), ROUNDING)
+
+
+def _unexplained(patch: Patch, jacobian: Array, residual: Array, covariance: Array) -> float:
+    """Factor of the covariance for what the model does not explain; 1 where it explains the picture.
+
+    Noise is independent from pixel to pixel. What a model leaves out goes on for many: then the pixels of one sector
+    around the disc together pull at its place by far more than noise would.
+
+    Source:
+        White 1980, A heteroskedasticity-consistent covariance matrix estimator, with sectors in the place of pixels.
+    """
+    along = np.arctan2(patch.rows - patch.rows.mean(), patch.columns - patch.columns.mean())
+    sector = np.floor((along / np.pi + 1.0) * 0.5 * SECTORS).astype(np.intp) % SECTORS
+    pulls = np.zeros((SECTORS, jacobian.shape[1]))
+    np.add.at(pulls, sector, jacobian * residual[:, None])
+    moved = pulls @ covariance[:, :2]  # times the noise: each sector's part in the place
+    noise = _noise(jacobian, residual)
+    scatter = np.trace(np.linalg.solve(covariance[:2, :2], moved.T @ moved)) / (2.0 * noise**2)
+    return max(1.0, float(scatter) / USUAL_SCATTER)
 
 
 def _at_pixels(patch: Patch, fine: Array) -> Array:

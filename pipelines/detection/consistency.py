@@ -12,6 +12,8 @@ from pipelines.detection.board_map import BoardMap
 LIMIT_PX = 0.5  # largest distance of a corner from the map through the others
 LIMIT_SHARE = 0.03  # or this share of the local square, whichever is more
 LIMIT_SPREADS, MOST_SHARE = 4.0, 0.15  # or so many median distances, up to this share of the local square
+SHARP_SPREADS, SHARP_PX = 12.0, 0.1  # but no more than so many median distances, nor less than this: beside what covers
+# a part of the board a corner may be half a pixel off where all others agree to a hundredth
 BAD_SHARE = 0.25  # of the corners that may be inconsistent before the board is, and one of few in any case
 PRIOR_FREEDOM = 10.0  # degrees of freedom with which the pixels' own noise counts against the corners' scatter
 
@@ -39,15 +41,19 @@ def drop_inconsistent(corners: Corners, at: Array, size: tuple[int, int], prior:
         weights = _weights(corners.covariance_px2, good)
         board = BoardMap.fit(at, points, size, weights, board)
         distance = _left_out(points, board, at, weights)
-        spread = LIMIT_SPREADS * float(np.median(distance[good]))
-        limit = np.maximum(np.maximum(LIMIT_PX, LIMIT_SHARE * side), np.minimum(spread, MOST_SHARE * side))
-        excess = np.where(good, distance / limit, 0.0)
+        excess = np.where(good, distance / _limits(side, float(np.median(distance[good]))), 0.0)
         worst = int(np.argmax(excess))
         if excess[worst] <= 1.0:
             break
         good[worst] = False
     factor = _scatter(corners, board, at, good, prior)
     return replace(corners, covariance_px2=corners.covariance_px2 * factor, consistent=good, board=board)
+
+
+def _limits(side: Array, typical: float) -> Array:
+    """(n,) largest distances from the map, px. side: (n,) of the local squares, px. typical: median distance, px."""
+    usual = np.minimum(np.maximum(LIMIT_PX, LIMIT_SHARE * side), max(SHARP_SPREADS * typical, SHARP_PX))
+    return np.maximum(usual, np.minimum(LIMIT_SPREADS * typical, MOST_SHARE * side))
 
 
 def too_many_bad(consistent: Mask) -> bool:

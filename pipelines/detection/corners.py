@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +23,7 @@ CLEAR_BLURS = 2.6  # blurs to keep between a fit's pixels and the next edge
 START_LIMIT = 0.3  # of the local square: a fit that moves further has gone to another corner
 OWN_NOISE = 0.33  # share of a corner's own noise in what is stated for it; the rest is the board's median
 SURE_NOISE = 0.7  # of a corner's own noise that is stated at least: its pixels tell it to a tenth
+MOST_NOISE = 50.0  # of the board's median variance: a corner beyond it is covered, and no model of an edge is right
 NEAR_PX, NEAR_BLURS = 5, 2.5  # radius of the first window, px and blurs
 FINAL_PX, FARTHEST_PX = 10, 100  # least and largest radius of the final one
 BAND_PX, BAND_BLURS = 1.0, 3.0  # to either side of an edge: pixels farther off tell nothing of its place
@@ -51,19 +53,40 @@ def refine_corners(image: Grey, board: BoardMap, sites: CornerSites) -> Corners:
         good = corners.consistent
         if np.mean(~good) > 0.5:
             return corners
-        board = BoardMap.fit(at, corners.points_px, size, good * 1.0, board)
+        board = _next_map(corners, board, at, size)
         limits = FINAL._replace(reach=_form_reach(corners, board, at))
         corners, shapes = _fit(image, board, sites, _next_shapes(corners, shapes, board, at), limits)
+    if np.mean(~corners.consistent) <= 0.5:
+        corners = replace(corners, board=_next_map(corners, corners.board, at, size))
     return drop_inconsistent(corners, at, size)
+
+
+def _next_map(corners: Corners, board: BoardMap, at: Array, size: tuple[int, int]) -> BoardMap:
+    """The map through the corners; where it misses them, that from starts of its own, if it is better.
+
+    A first map is made from corners that are good to a pixel, and holds the lens to a usual one.
+    """
+    weights, points = corners.consistent * 1.0, corners.points_px
+    near = BoardMap.fit(at, points, size, weights, board)
+    misfit, own = _misfit(corners, near, at)
+    if misfit <= MISFIT_NOISE * own:
+        return near
+    anew = BoardMap.fit(at, points, size, weights, lift=board.lift)
+    return anew if _misfit(corners, anew, at)[0] < misfit else near
+
+
+def _misfit(corners: Corners, board: BoardMap, at: Array) -> tuple[float, float]:
+    """Median squared distance, px^2, of the corners from a map, and what their own uncertainty makes of it."""
+    good = corners.consistent
+    misfit = np.median(np.sum((corners.points_px - board(at))[good] ** 2, axis=1))
+    return float(misfit), float(np.median(np.trace(corners.covariance_px2[good], axis1=1, axis2=2)))
 
 
 def _form_reach(corners: Corners, board: BoardMap, at: Array) -> float:
     """Squares along an edge up to which its form, as the map has it, is good to the corners' uncertainty."""
-    good = corners.consistent
-    misfit = np.median(np.sum((corners.points_px - board(at))[good] ** 2, axis=1))
-    own = np.median(np.trace(corners.covariance_px2[good], axis1=1, axis2=2))
+    misfit, own = _misfit(corners, board, at)
     excess = max(misfit - MISFIT_NOISE * own, 0.0)
-    return float((own / (FORM_SHARE**2 * excess + 1e-12)) ** 0.25)
+    return (own / (FORM_SHARE**2 * excess + 1e-12)) ** 0.25
 
 
 def _next_shapes(corners: Corners, shapes: Array, board: BoardMap, at: Array) -> Array:
@@ -91,6 +114,8 @@ def _fit(image: Grey, board: BoardMap, sites: CornerSites, shapes: Array, limits
     task = _task(board, jacobian, sites, shapes, limits.reach)
     fitted, covariance, noise, converged = fit_corners(image, task, limits.steps, STOP)
     good = _is_corner(fitted, covariance, task.starts, jacobian, sites)
+    with np.errstate(invalid="ignore"):
+        good &= noise <= MOST_NOISE * np.nanmedian(noise) if np.any(good) else True
     good &= converged if limits.must_converge else True
     points = fitted[:, :2]
     if not np.any(good):

@@ -35,7 +35,7 @@ def find_board(image: Grey, target: AnyChessboard) -> SeenPoints | PointStatus:
         return PointStatus.BOARD_NOT_FOUND
     if lattice.status != PointStatus.OK:
         return lattice.status
-    points = centred(image.astype(np.float32), lattice.points_px, lattice.side_px)
+    points = centred(image, lattice.points_px, lattice.side_px)
     return SeenPoints(lattice.ids, points, LATTICE)
 
 

@@ -37,14 +37,16 @@ def identify(
     seen = [p for turn in TURNS for p in _placements(turn, shape, white_first, look, target)]
     if isinstance(target, PlainChessboard):
         return _by_squares(seen, target, axes_px)
-    flipped = [p for turn in TURNS for p in _placements(turn @ MIRROR, shape, white_first, look, target)]
+    turns = () if _is_own_mirror_image(target) else TURNS
+    flipped = [p for turn in turns for p in _placements(turn @ MIRROR, shape, white_first, look, target)]
     return _by_circle(seen, flipped)
 
 
 def _by_circle(seen: list[Placement], flipped: list[Placement]) -> Placement | PointStatus:
     """Among the placements of the board, and those of its mirror image.
 
-    A placement that puts the circle on a square without one is out, unless all are: then the board has no circle.
+    A placement that puts the circle on a square without one is out. Where that leaves none, nor one of the mirror
+    image, the board has no circle.
     """
     shown, shown_flipped = ([p for p in some if p.disc == DISC] for some in (seen, flipped))
     if shown_flipped and not shown:
@@ -52,8 +54,17 @@ def _by_circle(seen: list[Placement], flipped: list[Placement]) -> Placement | P
         return PointStatus.ORIENTATION_AMBIGUOUS if is_open else PointStatus.MIRRORED
     if not seen:
         return PointStatus.OTHER_BOARD
-    left = shown or [p for p in seen if p.disc != CLEAR] or seen
+    left = shown or [p for p in seen if p.disc != CLEAR]
+    if not left and all(p.disc == CLEAR for p in flipped):
+        left = seen
     return left[0] if len(left) == 1 and not shown_flipped else PointStatus.ORIENTATION_AMBIGUOUS
+
+
+def _is_own_mirror_image(target: Chessboard) -> bool:
+    """Whether a mirror puts the board's squares on its squares and the circle on the circle."""
+    middle = np.array(target.circle_square) - (np.array((target.columns, target.rows)) + 1) / 2.0
+    kept = (turn @ MIRROR for turn in TURNS if turn[0, 0] != 0 or target.columns == target.rows)
+    return any(np.array_equal(mirror @ middle, middle) for mirror in kept)
 
 
 def _by_squares(seen: list[Placement], target: PlainChessboard, axes_px: Array) -> Placement | PointStatus:

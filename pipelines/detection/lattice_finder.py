@@ -31,10 +31,12 @@ MOST_PIECES = 3  # of a level's lattices that are looked at, the largest
 LEAST_POINTS = 7  # of a lattice: fewer make no map
 LEAST_PART = 0.25  # of the board's corners; fewer are no board, unless all that is seen says which they are
 LEAST_TYPICAL = 0.8  # median likeness of a board's points; noise that happens to look like a lattice has less
+FARTHEST_OFF = 0.15  # sides from the map through all points: a point farther off is none of the board's
 MOST_ROUGH = 0.08  # sides: root mean square distance of a board's points from the map through them; noise has more
 FIRM = 0.85  # of the lattice's median likeness: a point that looks less like a corner does not tell the lattice's size
 FIRM_CONTRAST = 0.5  # of its median contrast, likewise
 ENOUGH_PX = 16.0  # px of a level to a square: more show no more corners
+TOLD = (PointStatus.OK, PointStatus.MIRRORED)  # what is said where the picture tells which corner is which
 FARTHEST_GAP = 8  # columns and rows over which a lattice is looked for beyond what hides it
 
 
@@ -52,12 +54,11 @@ class SeenLattice:
         """Whether it tells more."""
         if other is None:
             return True
-        own, others = self.status == PointStatus.OK, other.status == PointStatus.OK
-        return (own, self.count) > (others, other.count)
+        return (self.status in TOLD, self.count) > (other.status in TOLD, other.count)
 
     def is_sharp_at(self, scale: float) -> bool:
         """Whether the squares are so large that a level of that scale, if finer, shows no more of them."""
-        return self.status in (PointStatus.OK, PointStatus.MIRRORED) and self.side_px > ENOUGH_PX * 2.0 * scale
+        return self.status in TOLD and self.side_px > ENOUGH_PX * 2.0 * scale
 
 
 def find_lattice(image: NDArray[np.uint8], target: AnyChessboard) -> SeenLattice | None:
@@ -83,21 +84,28 @@ def _seen(level: LevelOf, target: AnyChessboard) -> Iterator[SeenLattice]:
         grid = verified(smoothed, grid_of(piece))
         if np.sum(grid.known) < LEAST_POINTS:
             continue
-        grid = grow(smoothed, grid, most)
+        if not _is_whole(grid, target):
+            grid = grow(smoothed, grid, most)
         seen = _told(level, smoothed, grid, target)
         if seen is not None:
             yield seen
 
 
+def _is_whole(grid: Grid, target: AnyChessboard) -> bool:
+    """Whether just as many points as the board has corners are known, in as many columns and rows."""
+    return bool(np.all(grid.known)) and sorted(grid.points.shape[:2]) == sorted(target.inner)
+
+
 def _told(level: LevelOf, smoothed: Level, grid: Grid, target: AnyChessboard) -> SeenLattice | None:
     """Which corners the lattice's points are; None if they are too few."""
     firm = _firm_part(smoothed, grid)
-    if np.sum(firm.known) < target.inner[0] * target.inner[1]:
+    if not _is_whole(firm, target):
         firm = _firm_part(smoothed, _bridged(level, smoothed, firm, target))
     count = int(np.sum(firm.known))
     if count < LEAST_POINTS:
         return None
-    board, side = _map(firm, level), side_of(*(steps[firm.known] for steps in axes(firm.points)))
+    side = side_of(*(steps[firm.known] for steps in axes(firm.points)))
+    firm, board = _without_outliers(firm, level, side)
     if board is None or not _is_smooth(firm, board, side):
         return None
     radius = target.circle_radius_mm / target.square_mm if isinstance(target, Chessboard) else None
@@ -135,9 +143,25 @@ def _map(grid: Grid, level: LevelOf) -> BoardMap | None:
     y, x = np.nonzero(grid.known)
     at, size = np.stack((x, y), axis=1).astype(np.float64), (level.grey.shape[1], level.grey.shape[0])
     try:
-        return BoardMap.fit(at, grid.points[y, x], size, np.ones(len(at)), hold=FIRM_HOLD)
+        points = np.ascontiguousarray(grid.points[y, x])  # in another layout the fit would be compiled anew
+        return BoardMap.fit(at, points, size, np.ones(len(at)), hold=FIRM_HOLD)
     except np.linalg.LinAlgError:
         return None
+
+
+def _without_outliers(grid: Grid, level: LevelOf, side: float) -> tuple[Grid, BoardMap | None]:
+    """The lattice's points that lie near the map through them, and that map."""
+    board = _map(grid, level)
+    if board is None:
+        return grid, None
+    rows, columns = grid.points.shape[:2]
+    y, x = np.mgrid[0:rows, 0:columns]
+    expected = board(np.stack((x.ravel(), y.ravel()), axis=1).astype(np.float64)).reshape(rows, columns, 2)
+    far = np.linalg.norm(grid.points - expected, axis=-1) > FARTHEST_OFF * side
+    if not np.any(far) or np.sum(grid.known & ~far) < LEAST_POINTS:
+        return grid, board
+    grid = grid.with_points(np.where(far[..., None], np.nan, grid.points))
+    return grid, _map(grid, level)
 
 
 def _is_smooth(grid: Grid, board: BoardMap, side: float) -> bool:
@@ -177,5 +201,5 @@ def _on_board(smoothed: Level, grid: Grid, board: BoardMap, placement: Placement
     points[within] = grid.points[row[within], column[within]]
     own = Grid(points, white_first=False)
     expected = board(cells.reshape(-1, 2).astype(np.float64)).reshape(points.shape)
-    found = look_at(smoothed, own, expected, contrast_of(smoothed, grid))
+    found = look_at(smoothed, own, expected, contrast_of(smoothed, grid), FARTHEST_OFF)
     return own.with_points(np.where(own.known[..., None], points, found))

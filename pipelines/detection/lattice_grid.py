@@ -11,6 +11,7 @@ from pipelines.detection.saddle_links import STEPS, Piece
 from pipelines.detection.saddles import Level, sample
 
 TEMPLATE = np.array([-0.34, -0.23, -0.12, 0.12, 0.23, 0.34])  # squares from a corner, along x and y
+AROUND = tuple((x, y) for x in (-1, 0, 1) for y in (-1, 0, 1))
 SIGNS = np.sign(np.multiply.outer(TEMPLATE, TEMPLATE)).ravel()  # of the brightness there, rows are y
 
 
@@ -63,24 +64,25 @@ def grid_of(piece: Piece) -> Grid:
 def predicted(points: Array) -> Array:
     """(rows, columns, 2) px where each point would be by those near it, NaN where too few are: lines go on straight,
     and squares are parallelograms."""
-    one = [_moved(points, *step) for step in STEPS]
-    guesses = [2.0 * near - _moved(points, 2 * x, 2 * y) for near, (x, y) in zip(one, STEPS, strict=True)]
+    wide, size = _padded(points), points.shape[:2]
+    one = [_moved(wide, size, *step) for step in STEPS]
+    two = [_moved(wide, size, 2 * x, 2 * y) for x, y in STEPS]
+    guesses = [2.0 * near - far for near, far in zip(one, two, strict=True)]
     for a, b in ((0, 1), (1, 2), (2, 3), (3, 0)):
         (ax, ay), (bx, by) = STEPS[a], STEPS[b]
-        guesses.append(one[a] + one[b] - _moved(points, ax + bx, ay + by))
+        guesses.append(one[a] + one[b] - _moved(wide, size, ax + bx, ay + by))
     return _median(np.stack(guesses))
 
 
 def axes(points: Array) -> tuple[Array, Array]:
     """(rows, columns, 2) px along x and along y of the squares around each point, NaN where none is known."""
-    rows, columns = points.shape[:2]
-    steps = np.full((2, rows, columns, 2), np.nan)
-    steps[0, :, :-1] = points[:, 1:] - points[:, :-1]
-    steps[1, :-1] = points[1:] - points[:-1]
-    around = [(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1)]
-    along_x = _median(np.stack([_moved(steps[0], x, y) for x, y in [*around, (-2, 0), (-2, 1), (-2, -1)]]))
-    along_y = _median(np.stack([_moved(steps[1], x, y) for x, y in [*around, (0, -2), (1, -2), (-1, -2)]]))
-    return along_x, along_y
+    size, along = points.shape[:2], []
+    for axis, beyond in ((1, ((-2, 0), (-2, 1), (-2, -1))), (0, ((0, -2), (1, -2), (-1, -2)))):
+        steps = np.full_like(points, np.nan)
+        steps[tuple(slice(-1) if k == axis else slice(None) for k in range(2))] = np.diff(points, axis=axis)
+        wide = _padded(steps)
+        along.append(_median(np.stack([_moved(wide, size, x, y) for x, y in (*AROUND, *beyond)])))
+    return along[0], along[1]
 
 
 def likeness(level: Level, places: Array, along_x: Array, along_y: Array, signs: Array) -> tuple[Array, Array]:
@@ -96,14 +98,17 @@ def likeness(level: Level, places: Array, along_x: Array, along_y: Array, signs:
     return contrast / np.maximum(np.sqrt(np.mean(grey**2, axis=1)), 1e-6), contrast
 
 
-def _moved(points: Array, x: int, y: int) -> Array:
-    """At each place what is known x columns and y rows further, NaN beyond the border."""
+def _padded(points: Array) -> Array:
+    """With two unknown columns and rows on each side."""
     rows, columns = points.shape[:2]
-    out = np.full_like(points, np.nan)
-    if abs(x) < columns and abs(y) < rows:
-        source = points[max(0, y) : rows + min(0, y), max(0, x) : columns + min(0, x)]
-        out[max(0, -y) : rows + min(0, -y), max(0, -x) : columns + min(0, -x)] = source
+    out = np.full((rows + 4, columns + 4, 2), np.nan)
+    out[2:-2, 2:-2] = points
     return out
+
+
+def _moved(wide: Array, size: tuple[int, ...], x: int, y: int) -> Array:
+    """At each place what is known x columns and y rows further, of points that were `_padded`; at most two."""
+    return wide[2 + y : 2 + y + size[0], 2 + x : 2 + x + size[1]]
 
 
 def _median(values: Array) -> Array:

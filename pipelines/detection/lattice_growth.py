@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from eposit.arrays import Array, Mask
 from pipelines.detection.lattice_grid import Grid, axes, likeness, predicted
 from pipelines.detection.saddles import Level
 
-LEAST_LIKENESS = 0.6
+LEAST_LIKENESS = 0.72  # half a corner at the edge of what covers the other half has 0.71
 LEAST_CONTRAST = 0.3  # of the lattice's median
 SEARCH = np.array([-0.24, -0.12, 0.0, 0.12, 0.24])  # squares around the predicted place, along x and y
 FARTHEST = 0.36  # squares from the predicted place that a corner may lie
@@ -38,36 +39,47 @@ def grow(level: Level, grid: Grid, most: int) -> Grid:
     """The lattice with all places that can be reached from it step by step, up to `most` columns and rows."""
     contrast = contrast_of(level, grid)
     for _ in range(MOST_ROUNDS):
+        if max(grid.points.shape[:2]) > most:
+            break
         wide = grid.padded(1)
         found = look_at(level, wide, predicted(wide.points), contrast)
         new = np.where(wide.known[..., None], wide.points, found)
         if np.sum(np.isfinite(new[..., 0])) == np.sum(grid.known):
             break
         grid = wide.with_points(new).cropped()
-        if max(grid.points.shape[:2]) > most:
-            break
     return grid
 
 
-def look_at(level: Level, grid: Grid, expected: Array, contrast: float) -> Array:
-    """(rows, columns, 2) px of corners near where they are expected, NaN where there is none, or one is known."""
+def look_at(level: Level, grid: Grid, expected: Array, contrast: float, farthest: float = FARTHEST) -> Array:
+    """(rows, columns, 2) px of corners near where they are expected, NaN where there is none, or one is known.
+
+    contrast: of the lattice. farthest: squares from there that a corner may lie.
+    """
     out = np.full_like(grid.points, np.nan)
     along_x, along_y = axes(np.where(np.isfinite(grid.points), grid.points, expected))
     use = ~grid.known & np.all(np.isfinite(np.concatenate((expected, along_x, along_y), axis=-1)), axis=-1)
     if not np.any(use):
         return out
     at, ax, ay, signs = expected[use], along_x[use], along_y[use], grid.signs[use]
-    tries = np.stack([at + u * ax + v * ay for v in SEARCH for u in SEARCH])
-    likes = np.stack([np.nan_to_num(likeness(level, place, ax, ay, signs)[0], nan=-1.0) for place in tries])
-    best = np.take_along_axis(tries, likes.argmax(axis=0)[None, :, None], 0)[0]
+    best = _most_likely(level, at, ax, ay, signs)
     found = centred(level, best, side_of(ax, ay))
     like, has = likeness(level, found, ax, ay, signs)
-    good = _look_like_corners(like, has, contrast) & _near(found, at, ax, ay)
+    good = _look_like_corners(like, has, contrast) & _near(found, at, ax, ay, farthest)
     out[use] = np.where(good[:, None], found, np.nan)
     return out
 
 
-def centred(level: Level, points: Array, side_px: float) -> Array:
+def _most_likely(level: Level, at: Array, along_x: Array, along_y: Array, signs: Array) -> Array:
+    """(n, 2) px of what looks most like a corner around (n, 2) px."""
+    u, v = np.tile(SEARCH, len(SEARCH)), np.repeat(SEARCH, len(SEARCH))
+    tries = at[:, None] + u[:, None] * along_x[:, None] + v[:, None] * along_y[:, None]
+    each = [np.repeat(part, len(u), axis=0) for part in (along_x, along_y, signs)]
+    like = likeness(level, tries.reshape(-1, 2), each[0], each[1], each[2])[0].reshape(tries.shape[:2])
+    best = np.nan_to_num(like, nan=-1.0).argmax(axis=1)
+    return tries[np.arange(len(at)), best]
+
+
+def centred(level: Level | NDArray[np.uint8], points: Array, side_px: float) -> Array:
     """(n, 2) px moved to the corners they are near to; as they are where that leads away.
 
     side_px: of the squares.
@@ -109,11 +121,11 @@ def _look_like_corners(like: Array, contrast: Array, usual: float) -> Mask:
     return (like > LEAST_LIKENESS) & (contrast > LEAST_CONTRAST * usual)
 
 
-def _near(points: Array, expected: Array, along_x: Array, along_y: Array) -> Mask:
+def _near(points: Array, expected: Array, along_x: Array, along_y: Array, farthest: float = FARTHEST) -> Mask:
     """(n,) whether points lie near where they are expected; those of which nothing is expected do."""
     matrix = np.stack((along_x, along_y), axis=-1)
     determinant = np.linalg.det(matrix)
     sound = np.abs(determinant) > 1e-6
     matrix[~sound] = np.eye(2)
     off = np.linalg.solve(matrix, (points - expected)[..., None])[..., 0]
-    return sound & ~(np.linalg.norm(off, axis=1) > FARTHEST)
+    return sound & ~(np.linalg.norm(off, axis=1) > farthest)

@@ -13,8 +13,10 @@ from eposit.arrays import Array
 from pipelines.detection.saddles import Level
 from pipelines.detection.textured_region import textured_region
 
+MOST_PART = 0.5  # of the picture, for its textured region to be looked at before the whole
 FIRST_PIXELS = 7e5  # of the level that is looked at first, at most
 MOST_PIXELS = 6.5e6  # of any
+LEAST_PICTURE_PX = 16
 LEAST_SIDE_PX = 60  # of a level
 ENLARGEMENT, LEAST_ENLARGEMENT, ENLARGED_PIXELS = 3.0, 1.3, 2.5e6
 
@@ -37,19 +39,21 @@ class LevelOf:
 
 
 def levels(image: NDArray[np.uint8]) -> Iterator[LevelOf]:
-    """The levels of an 8-bit picture (height, width)."""
+    """The levels of an 8-bit picture (height, width); none of one that is too small for a board."""
+    if min(image.shape) < LEAST_PICTURE_PX:
+        return
+    region = textured_region(image)
+    part, first_px = image[region.pixels].astype(np.float32), np.array([region.x, region.y], np.float64)
+    if part.size < MOST_PART * image.size:
+        yield _reduced(part, _first_scale(part), first_px)
     whole = image.astype(np.float32)
-    first = 1
-    while whole.size / first**2 > FIRST_PIXELS:
-        first *= 2
+    first = _first_scale(whole)
     finer = [first // 2**k for k in range(1, first.bit_length())]
     yield from (_reduced(whole, scale) for scale in [first, *finer[:1]])
     coarser = 2 * first
     while min(whole.shape) / coarser >= LEAST_SIDE_PX:
         yield _reduced(whole, coarser)
         coarser *= 2
-    region = textured_region(image)
-    part, first_px = whole[region.pixels], np.array([region.x, region.y], np.float64)
     for scale in finer[1:]:
         if whole.size / scale**2 <= MOST_PIXELS:
             yield _reduced(whole, scale)
@@ -59,6 +63,13 @@ def levels(image: NDArray[np.uint8]) -> Iterator[LevelOf]:
     if enlargement >= LEAST_ENLARGEMENT:
         large = cv2.resize(part, None, fx=enlargement, fy=enlargement, interpolation=cv2.INTER_CUBIC)
         yield LevelOf(np.asarray(large, np.float32), 1.0 / enlargement, first_px)
+
+
+def _first_scale(whole: Level) -> int:
+    scale = 1
+    while whole.size / scale**2 > FIRST_PIXELS:
+        scale *= 2
+    return scale
 
 
 def _reduced(whole: Level, scale: int, first_px: Array | None = None) -> LevelOf:

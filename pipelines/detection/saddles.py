@@ -21,6 +21,7 @@ LEAST_STRENGTH = 0.03  # of the saddle over the variance around it; 4 / pi^2 whe
 FLAT_GREY, FLAT_NOISES = 1.0, 4.0  # spread of what counts as flat: grey levels, and standard deviations of the noise
 NOISE_STRIDE = 7  # every so many pixels tell the noise
 MOST_SADDLES = 3000  # the strongest; bounds the work that noise and textures make
+MOST_MAPPED = 30000  # rows of places that OpenCV takes at once
 RING_PX, RING_SAMPLES = 3.5, 32
 LEAST_SWING = 6.0  # noises between the ring's brightest and darkest sample
 OPPOSITE_RAD = 0.7  # how far an edge may bend at the saddle, as seen from the ring
@@ -56,6 +57,9 @@ def sample(level: Level, points: Array) -> Array:
     if not points.size:
         return np.empty(points.shape[:-1])
     flat = np.asarray(points, np.float32).reshape(-1, points.shape[-2], 2)
+    if len(flat) > MOST_MAPPED:
+        half = len(flat) // 2
+        return np.concatenate([sample(level, flat[:half]), sample(level, flat[half:])]).reshape(points.shape[:-1])
     values = cv2.remap(
         level,
         np.ascontiguousarray(flat[..., 0]),

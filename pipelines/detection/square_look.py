@@ -15,8 +15,9 @@ from pipelines.detection.saddles import Level, sample
 INNER = np.linspace(-0.42, 0.42, 15)  # squares from a square's middle at which it is looked at, along x and y
 LIGHT_REACH = 1.5  # squares: how far the grey of other squares of its colour counts for a square's own
 CLEAR_SHARE = 0.2  # of the disc's area: a square with less darkness holds no disc
-DISC_SHARES = (0.45, 2.2)  # of the disc's area, with its shadow
-DISC_OFF = 0.3  # squares that the disc's middle may lie from the square's: it stands above the board
+UNEVEN = 0.2  # darkness that light and noise make on white
+DISC_SHARES = (0.4, 2.2)  # of the disc's area, with its shadow
+DISC_OFF = 0.38  # squares that the middle of the disc may lie from that of the square: it stands above the board
 DISC_SPREAD = 1.7  # of a disc's mean square distance from its middle, which other dark shapes exceed
 BEYOND, MOST_BEYOND = 0.5, 0.25  # of the margin, and squares: how far beyond the last squares is looked for white
 BESIDE = np.array([-0.25, 0.0, 0.25])  # squares along the side
@@ -49,36 +50,43 @@ def look_at_squares(level: Level, board: BoardMap, grid: Grid, radius: float | N
     grey = sample(level, board(places.reshape(-1, 2)).reshape(*places.shape[:2], -1, 2).reshape(-1, places.shape[2], 2))
     grey = grey.reshape(rows + 1, columns + 1, -1)
     white = (np.add.outer(np.arange(rows + 1), np.arange(columns + 1)) % 2 == 0) == grid.white_first
-    middle = _middle_grey(grey, white)
+    levels = _levels(grey, white)
     discs = np.full(white.shape, UNKNOWN)
     if radius is not None:
-        discs[white] = _classified((grey < middle[..., None])[white], np.isfinite(grey).all(axis=-1)[white], radius)
+        dark = (levels[1][..., None] - grey) / np.maximum(levels[1] - levels[0], 1e-6)[..., None]
+        discs[white] = _classified(dark[white], radius)
+    middle = levels.mean(axis=0)
     ends = [_ends(level, board, side, white, middle, margin) for side in SIDES]
     return Look(discs, (ends[0], ends[1], ends[2], ends[3]))
 
 
-def _middle_grey(grey: Array, white: Mask) -> Array:
-    """(rows, columns) grey level between black and white at each square, from the squares between points around it."""
+def _levels(grey: Array, white: Mask) -> Array:
+    """(2, rows, columns) grey of black and of white at each square, from the squares between points around it."""
     rows, columns = white.shape
     y, x = np.mgrid[0:rows, 0:columns]
     inner = (y > 0) & (y < rows - 1) & (x > 0) & (x < columns - 1)
     median = np.median(grey, axis=-1)
-    total = np.zeros(white.shape)
-    for colour in (True, False):
+    levels = np.full((2, rows, columns), np.nan)
+    for colour in (False, True):
         some = inner & (white == colour) & np.isfinite(median)
         square = (y[..., None] - y[some]) ** 2 + (x[..., None] - x[some]) ** 2
         weight = np.exp(-0.5 * square / LIGHT_REACH**2) + 1e-12
-        total += 0.5 * (weight @ median[some]) / weight.sum(axis=-1) if np.any(some) else np.nan
-    return total
+        if np.any(some):
+            levels[int(colour)] = (weight @ median[some]) / weight.sum(axis=-1)
+    return levels
 
 
-def _classified(dark: Mask, whole: Mask, radius: float) -> NDArray[np.int64]:
-    """(n,) what white squares hold, from which of their places (n, m) are dark. whole: (n,) they are all in view."""
+def _classified(dark: Array, radius: float) -> NDArray[np.int64]:
+    """(n,) what white squares hold, from how dark their places (n, m) are: 0 white, 1 black, NaN out of view.
+
+    Of blurred discs the darkness is summed, which is as much as that of sharp ones.
+    """
     v, u = (part.ravel() for part in np.meshgrid(INNER, INNER, indexing="ij"))
     area = float(np.mean(np.hypot(u, v) < radius))
-    share, count = dark.mean(axis=1) / area, np.maximum(dark.sum(axis=1), 1)
-    mean_u, mean_v = dark @ u / count, dark @ v / count
-    spread = dark @ (u**2 + v**2) / count - mean_u**2 - mean_v**2
+    whole, dark = np.isfinite(dark).all(axis=1), np.clip(dark - UNEVEN, 0.0, 1.0) / (1.0 - UNEVEN)
+    share, total = dark.mean(axis=1) / area, np.maximum(dark.sum(axis=1), 1e-6)
+    mean_u, mean_v = dark @ u / total, dark @ v / total
+    spread = dark @ (u**2 + v**2) / total - mean_u**2 - mean_v**2
     disc = (share > DISC_SHARES[0]) & (share < DISC_SHARES[1]) & (np.hypot(mean_u, mean_v) < DISC_OFF)
     disc &= spread < DISC_SPREAD * 0.5 * radius**2
     return np.where(whole & disc, DISC, np.where(whole & (share < CLEAR_SHARE), CLEAR, UNKNOWN))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import wait
@@ -28,7 +28,7 @@ class _Worker:
 
 def run_in_processes(
     run_one: Callable[[Any], Any], tasks: Sequence[Any], count: int
-) -> Iterator[tuple[Any, Any, Failure | None]]:
+) -> Generator[tuple[Any, Any, Failure | None], None, None]:
     """Each task with its result, or with why it failed twice, in any order.
 
     Raises:

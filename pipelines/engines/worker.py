@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import pickle
 import traceback
 from collections.abc import Callable
 from multiprocessing.connection import Connection
-from multiprocessing.reduction import ForkingPickler
 from typing import Any
 
 
@@ -29,7 +29,7 @@ def _outcome(run_one: Callable[[Any], Any], task: Any) -> tuple[Any, BaseExcepti
 def _picklable(error: Exception) -> Exception:
     """The error itself, or what it says where it cannot go through a pipe."""
     try:
-        ForkingPickler.loads(ForkingPickler.dumps(error))
+        pickle.loads(pickle.dumps(error))
     except Exception:
         return RuntimeError(f"{type(error).__name__}: {error}")
     return error

@@ -21,6 +21,7 @@ MOST_STEPS = 12  # three to five are usual; it bounds the time that a picture ta
 LEAST_STEPS = 2  # the noise of the first comes from residuals of the start
 STOP = 0.1  # step, in standard deviations of the pose, at which the search has ended; it is still made
 CAUCHY = 5.0  # deviations at which a pixel has half its weight; gaussian noise then costs 1 % of the information
+WHITEST, CLIPPED = 255.0, 3.0  # grey value at which a picture is clipped, and deviations below it that noise spans
 MOST_DOUBTED = 0.25  # share of the pixels on edges that may have less than half their weight
 MOST_MOVED = 5.0  # root mean square over six directions, in deviations of start and result together
 
@@ -90,10 +91,12 @@ def _fit(model: PictureModel, at: _Iterate, observed: Array) -> _Fit:
     slope = np.hypot(*modelled.channels[2:4, model.used])
     variance = Noise.of(residuals, grey, slope).variance(grey, slope)
     trust = 1.0 / (1.0 + residuals**2 / (variance * CAUCHY**2))
+    trust[grey > WHITEST - CLIPPED * np.sqrt(variance)] = 0.0  # by the model, as noise would choose among observed ones
     sums = model.sums(modelled, residuals, trust / variance)
     step = solve(sums, model.grid, at.fields)
     covariance = at_least(step.covariance, sandwich(sums, step, model.grid))
-    return _Fit(step, covariance, float(np.mean(trust[slope > EDGE_SHARE * slope.max()] < 0.5)))
+    doubted = (trust > 0.0) & (trust < 0.5)
+    return _Fit(step, covariance, float(np.mean(doubted[slope > EDGE_SHARE * slope.max()])))
 
 
 def _judged(shape: Shape, fit: _Fit, start: Pose, start_covariance: Array, steps: int) -> Refined:

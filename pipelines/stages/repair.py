@@ -66,10 +66,13 @@ def answers_of(variant: str) -> Setting | System:
             f"the poses of {solver!r} came from a file; run `score DIR --poses FILE --name {solver}` with it, and then "
             "repair again"
         )
-    points = "truth+noise" if found["noise"] else found["points"].partition("-")[0]
-    noise = {"noise_px": float(found["noise"]), "draws": int(found["draws"])} if found["noise"] else {}
-    detector = {"detector": found["detector"]} if found["detector"] else {}
-    return Setting(solver, points, found["camera"], found["use"], **noise, **detector)
+    setting = Setting(solver, "truth", found["camera"], found["use"])
+    if found["noise"]:
+        noise, draws = float(found["noise"]), int(found["draws"])
+        return dataclasses.replace(setting, points="truth+noise", noise_px=noise, draws=draws)
+    if found["detector"]:
+        return dataclasses.replace(setting, points="detected", detector=found["detector"])
+    return dataclasses.replace(setting, points=found["points"])
 
 
 def _make(dataset: Dataset, wanted: Sequence[tuple[str, str, Path]], execution: Execution) -> None:

@@ -24,10 +24,10 @@ MAX_SQUARES, MAX_MARGIN = 24, 3.0  # the map of the light has 100 x 100 points i
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Chessboard:
-    """Chessboard with a raised circle.
+    """Chessboard with a raised circle, which tells the orientation where the squares look the same after half a turn.
 
     Raises:
-        ValueError: a board that is too small, symmetric under half a turn, or a circle that does not fit its square.
+        ValueError: a board that is too small, or a circle that does not fit its square or lies in the board's middle.
     """
 
     pattern: Annotated[Literal["chessboard"], PATTERN_MEANING] = "chessboard"
@@ -55,11 +55,9 @@ class Chessboard:
         self._check_circle()
 
     def _check_squares(self) -> None:
-        given = f"target has {self.columns} x {self.rows} squares"
         if not (4 <= self.columns <= MAX_SQUARES and 4 <= self.rows <= MAX_SQUARES):
+            given = f"target has {self.columns} x {self.rows} squares"
             raise ValueError(f"{given}; each number must lie in 4 to {MAX_SQUARES}")
-        if (self.columns + self.rows) % 2 == 0:
-            raise ValueError(f"{given}, which looks the same after half a turn; make one number even and the other odd")
 
     def _check_circle(self) -> None:
         column, row = self.circle_square
@@ -67,6 +65,11 @@ class Chessboard:
             raise ValueError(
                 f"target circle_square is {list(self.circle_square)}; it must be a white square: column 1 to "
                 f"{self.columns}, row 1 to {self.rows}, with an odd sum"
+            )
+        if (2 * column, 2 * row) == (self.columns + 1, self.rows + 1):
+            raise ValueError(
+                f"target circle_square is {list(self.circle_square)}, the middle of {self.columns} x {self.rows} "
+                "squares, which look the same after half a turn; choose another white square"
             )
         if self.circle_radius_mm > 0.45 * self.square_mm:
             raise ValueError(

@@ -68,7 +68,10 @@ RECIPES = {
         ),
         "cameras are named pinhole, pinhole",
     ),
-    "symmetric board": (added("[target]\nrows = 8"), "looks the same after half a turn"),
+    "circle in the middle": (
+        added("[target]\ncolumns = 9\nrows = 7\ncircle_square = [5, 4]"),
+        "look the same after half a turn",
+    ),
     "circle on a black square": (added("[target]\ncircle_square = [1, 1]"), "it must be a white square"),
     "one of four twice": (recipe("[2, 0]", "[0, 0]"), "give four different ones"),
     "no such corner": (recipe("[2, 0]", "[9, 0]"), "target has no point [9, 0]"),

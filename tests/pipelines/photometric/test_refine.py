@@ -77,3 +77,16 @@ def test_an_occluder_costs_accuracy_not_truth(case):
     assert found.status == Status.OK
     # Chi-square of six beyond 28 has a chance of 1e-4; twice that for the pole's own edges.
     assert error @ np.linalg.solve(found.covariance, error) < 60.0
+
+
+def test_clipped_light_costs_accuracy_not_truth(case):
+    """Where the light is strongest the picture is clipped: those pixels tell nothing of their light."""
+    bright = np.clip(np.rint(np.linspace(1.0, 1.6, 400) * case.picture()), 0, 255).astype(np.uint8)
+    assert np.mean(bright == 255) > 0.05
+    whole, found = refined(case, case.picture()), refined(case, bright)
+    error = case.error(found.shape.cam_from_obj)
+    assert found.status == Status.OK
+    # Chi-square of six beyond 28 has a chance of 1e-4.
+    assert error @ np.linalg.solve(found.covariance, error) < 28.0
+    # Half of the edges are left on a quarter of the board; light that is fitted to clipped pixels makes it 6 times.
+    assert np.all(np.diag(found.covariance) < 3.0**2 * np.diag(whole.covariance))
