@@ -61,8 +61,6 @@ LONG = {
     "solve": "half of it is the contract that users read",
     "derivatives": "one pass over the points, with all sums in local variables: a sum in memory would wait for it",
     "register_sensor": "defines a class inside it: its base is there only once Mitsuba's variant is set",
-    "register_sensor": "defines a class inside it: its base is there only once Mitsuba's variant is set",
-    "derivatives": "one pass over the points, with all sums in local variables: a sum in memory would wait for it",
 }
 
 
