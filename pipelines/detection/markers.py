@@ -16,6 +16,9 @@ from render.targets.aprilgrid import BORDER_MODULES, AprilGrid
 from render.targets.charuco import Charuco
 
 ENLARGEMENT, MOST_PIXELS = 2.0, 8e6  # modules of two or three pixels are read in an enlarged picture only
+UNREDUCED_PIXELS = (
+    5e6  # a larger picture is reduced to so many: its textures would be read as markers for half a minute
+)
 UPRIGHT = (2, 3, 0, 1)  # corners of Kalibr's tag in the order in which OpenCV, for whom it stands on its head, has them
 
 
@@ -61,11 +64,14 @@ def _tag_detector() -> cv2.aruco.ArucoDetector:
 
 
 def _enlarged(image: Grey) -> tuple[NDArray[np.uint8], float, Array]:
-    """The textured region enlarged, by how much, and its first pixel."""
+    """The textured region enlarged or reduced, by how much, and its first pixel."""
     region = textured_region(image)
     part = image[region.pixels]
     scale = max(1.0, min(ENLARGEMENT, float(np.sqrt(MOST_PIXELS / part.size))))
-    large = cv2.resize(part, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
+    if part.size > UNREDUCED_PIXELS:
+        scale = float(np.sqrt(UNREDUCED_PIXELS / part.size))
+    kind = cv2.INTER_AREA if scale < 1.0 else cv2.INTER_CUBIC
+    large = cv2.resize(part, None, fx=scale, fy=scale, interpolation=kind)
     return large.astype(np.uint8), scale, np.array([region.x, region.y], np.float64)
 
 
