@@ -25,7 +25,7 @@ class Child:
     """A process and the pipe to it."""
 
     process: SpawnProcess
-    pipe: Connection
+    pipe: Any  # Any: a Connection, on Windows a PipeConnection
 
     def kill(self, *, group: bool = False) -> None:
         """End the process; group: and those that it has started, if it leads a group of its own."""

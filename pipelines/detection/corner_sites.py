@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from eposit.arrays import Array, Mask
 from pipelines.detection.board_map import grid
@@ -27,7 +29,7 @@ class CornerSites:
     clear: float = np.inf  # pixels farther than this from both edges see other print
     circled: Chessboard | None = None  # the board whose raised circle hides some of it
 
-    def chosen(self, which: Mask) -> CornerSites:
+    def chosen(self, which: Mask | NDArray[np.integer[Any]]) -> CornerSites:
         """Some of the places."""
         return replace(self, at=self.at[which], sense=self.sense[which])
 

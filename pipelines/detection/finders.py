@@ -59,7 +59,8 @@ def find_sector_based(image: Grey, target: AnyChessboard) -> SeenPoints | PointS
     found, corners = cv2.findChessboardCornersSB(part, target.inner, flags=SECTOR_FLAGS)
     if not found:
         return PointStatus.BOARD_NOT_FOUND
-    distance, nearest = cKDTree(corners.reshape(-1, 2) + low).query(seen.points_px)
+    nearby = cKDTree(corners.reshape(-1, 2) + low).query(seen.points_px)
+    distance, nearest = np.asarray(nearby[0]), np.asarray(nearby[1])
     if len(set(nearest.tolist())) < whole or distance.max() > SECTOR_APART * side:
         return PointStatus.BOARD_NOT_FOUND
     return SeenPoints(seen.ids, (corners.reshape(-1, 2) + low)[nearest].astype(np.float64), SECTOR)

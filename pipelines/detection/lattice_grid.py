@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eposit.arrays import Array
+from eposit.arrays import Array, Mask
 from pipelines.detection.saddle_links import STEPS, Piece
 from pipelines.detection.saddles import Level, sample
 
@@ -23,7 +23,7 @@ class Grid(NamedTuple):
     white_first: bool
 
     @property
-    def known(self) -> Array:
+    def known(self) -> Mask:
         """(rows, columns) True where the point is known."""
         return np.isfinite(self.points[..., 0])
 

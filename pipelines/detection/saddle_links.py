@@ -62,8 +62,7 @@ def _nearest(smoothed: Level, saddles: Saddles) -> tuple[Indices, Indices]:
     """(n, 4) nearest saddle along each edge, -1 for none, and (n, 4) which of its edges leads back."""
     points, n = saddles.points, len(saddles.points)
     count = min(NEAREST + 1, n)
-    distance, other = cKDTree(points).query(points, k=count)
-    distance, other = distance[:, 1:].ravel(), other[:, 1:].ravel()
+    distance, other = (np.asarray(part)[:, 1:].ravel() for part in cKDTree(points).query(points, k=count))
     own = np.repeat(np.arange(n), count - 1)
     way = points[other] - points[own]
     angle = np.arctan2(way[:, 1], way[:, 0])

@@ -81,7 +81,7 @@ def _noise(second: Level) -> float:
     return median / 0.6745 * SMOOTHING_PX**2 / np.sqrt(3.0)  # white noise, smoothed: its derivative is so much smaller
 
 
-def _peaks(smoothed: Level, strength: Level, noise: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _peaks(smoothed: Level, strength: Array, noise: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Rows and columns of the strongest local maxima of the saddle's strength."""
     flat = (FLAT_GREY + FLAT_NOISES * noise) ** 2
     peak = strength > LEAST_STRENGTH * flat / SMOOTHING_PX**4
