@@ -20,6 +20,7 @@ from pipelines.detection.circle_model import (
     LAMP,
     LINEAR,
     OBLONG,
+    ROUNDING,
     SHADOW,
     SHAPE,
     SIZE,
@@ -55,7 +56,7 @@ LENS_SPREAD = (100.0, 100.0, 0.3, 0.3, 0.3)  # of the rest of a lens of which no
 SURE_SHARE = 0.01  # of a square: a prediction less sure than this has the circle looked for around it
 LOOKS = (5, 9)  # places along both axes of the ellipse in which a circle is looked for
 LOOK_SPREADS = 10.0  # half its axes, in deviations of the prediction: it is far from linear
-GOOD_SHARE = 1.5  # of the residuals of the best fit in the ellipse, up to which a fit from the prediction is kept
+GOOD_SHARE = 1.2  # of the residuals of the best fit in the ellipse, up to which a fit from the prediction is kept
 FAR_SPREADS = 3.0  # of the prediction that a circle may lie off, for each that a linear map allows
 SIZE_LIMIT = 0.03  # of the size
 LEAST_AXIS = 1.5  # blurs: a disc whose smaller half axis is below this has no edges of its own
@@ -94,7 +95,7 @@ def find_circle(
     ]
     if not fits:
         return None
-    fit = fits[0] if fits[0].residual <= GOOD_SHARE * fits[-1].residual else fits[-1]
+    fit = fits[0] if fits[0].residual <= GOOD_SHARE * fits[-1].residual + ROUNDING else fits[-1]
     shift = fit.values[:2]
     found = fit.converged and _is_near(shift * radius, unsure) and abs(fit.values[SIZE] - 1.0) < SIZE_LIMIT
     if not found or fit.values[WHITE_GREY] - fit.values[DISC_GREY] < LEAST_CONTRAST * contrast:

@@ -55,8 +55,8 @@ def test_edges_without_any_blur_are_placed_by_the_share_of_each_pixel(shift):
     first = BoardMap.fit(CORNERS, truth + np.random.default_rng(0).uniform(-0.3, 0.3, truth.shape), size, np.ones(54))
     found = refine_corners(np.rint(image).astype(np.uint8), first, sites)
     assert found.consistent.all()
-    # Measured 0.0003 px, and 0.0147 where an edge lies 0.05 px from a pixel's border: the model has a blur of 0.06 px
-    # at least, so that its derivatives are smooth. A gaussian in the place of the pixel's area is up to 0.15 px off.
+    # Measured 0.0003 px, and 0.0147 where an edge lies 0.05 px from a pixel's border: the model keeps a blur of 0.06
+    # px, so that its derivatives are smooth. A gaussian in the place of the pixel's area is up to 0.15 px off.
     assert np.abs(found.points_px - truth).max() < (0.02 if shift == 0.45 else 0.004)
 
 
