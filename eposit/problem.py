@@ -46,7 +46,7 @@ class Problem:
 def _numbers(values: ArrayLike) -> Array:
     """As a contiguous array; NaN where a masked array is masked."""
     if isinstance(values, np.ma.MaskedArray):
-        values = np.where(np.ma.getmaskarray(values), np.nan, np.ma.getdata(values).astype(np.float64))
+        values = np.ma.filled(np.ma.asarray(values, dtype=np.float64), np.nan)
     return np.ascontiguousarray(values, dtype=np.float64)
 
 
