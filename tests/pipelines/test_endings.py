@@ -16,6 +16,7 @@ import pytest
 from pipelines.cli import guarded
 from pipelines.endings import UNEXPECTED, UNFINISHED
 from pipelines.stages import generate
+from tests.signals import heed_signals
 from tests.wrong_input import first
 
 ROOT = Path(__file__).parents[2]
@@ -26,7 +27,8 @@ MOMENTS = 20  # of each signal
 def started(*words, **options):
     return subprocess.Popen(
         [sys.executable, "-m", "pipelines", *map(str, words)],
-        cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, **options,
+        cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+        **({"preexec_fn": heed_signals} | options),
     )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ import pytest
 
 from datasets.errors import UserError
 from pipelines.engines.local import LocalEngine
+from tests.signals import heed_signals
 
 ROOT = Path(__file__).parents[3]
 PATIENCE_S = 60.0
@@ -114,8 +115,9 @@ def test_workers_end_with_their_parent(name, tmp_path):
     folder.mkdir()
     paths = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
     process = subprocess.Popen(
-        [sys.executable, script, folder], env=os.environ | {"PYTHONPATH": paths}, stderr=subprocess.DEVNULL
-    )
+        [sys.executable, script, folder],
+        env=os.environ | {"PYTHONPATH": paths}, stderr=subprocess.DEVNULL, preexec_fn=heed_signals,
+    )  # fmt: skip
     end = time.monotonic() + PATIENCE_S
     while len(list(folder.iterdir())) < 2 and process.poll() is None and time.monotonic() < end:
         time.sleep(0.02)

@@ -1,0 +1,9 @@
+"""Signals of the processes that tests start."""
+
+import signal
+
+
+def heed_signals():
+    """In a new process: no signal is ignored, as `nohup` and a shell's background jobs leave some to their children."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
+        signal.signal(number, signal.SIG_DFL)
