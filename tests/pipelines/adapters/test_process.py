@@ -108,6 +108,7 @@ def test_a_time_limit_that_is_none(limit):
         check_limit(limit)
 
 
+@pytest.mark.full
 def test_a_function_that_hangs_in_a_dataset(root, cli, tmp_path, monkeypatch):
     module = own_module(tmp_path, monkeypatch, "import time\ndef solve(a, b, camera):\n    time.sleep(600)\n")
     done = cli("estimate", root, "--solver", f"{module}:solve", "--timeout", "5", "-q")

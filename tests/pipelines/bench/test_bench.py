@@ -79,6 +79,7 @@ def test_an_unknown_part_is_a_sentence(cli):
     assert all(name in outcome.err for name in parts())
 
 
+@pytest.mark.full
 def test_solvers_are_measured_on_the_papers_draws():
     camera, pixels = camera_with("perspective"), draws(722)
     assert pixels.shape == (722, 4, 2)

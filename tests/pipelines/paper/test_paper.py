@@ -36,6 +36,7 @@ def test_the_mean_depth_errors_are_those_known_of_both_behaviours():
         assert np.mean([np.nanmean(error[..., 5]) for error in errors]) == pytest.approx(known, abs=2.2)
 
 
+@pytest.mark.full
 def test_the_default_solver_and_opnp_reach_the_bound_on_single_frames():
     for call, seeds in ((simulation.best, 20), (simulation.with_opnp, 4)):
         problem = simulation.draws("perspective", seeds)

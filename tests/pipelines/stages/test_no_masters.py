@@ -35,6 +35,7 @@ def test_the_content_is_that_of_a_dataset_with_them(place, bare, cli, content):
     assert cli("report", root).code == 0
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("again", [(), ("--no-masters",)], ids=["as it began", "told again"])
 @pytest.mark.parametrize("workers", [1, 2])
 def test_it_is_resumed_as_it_began(again, workers, bare, cli, content):

@@ -71,6 +71,7 @@ def test_poses_of_a_file_have_no_parts(root, cli):
     assert files(root) == before
 
 
+@pytest.mark.full
 def test_four_processes_at_once_and_then_the_report(whole, tmp_path, cli, content):
     recipe, source = whole
     root = tmp_path / "dataset"
