@@ -168,19 +168,23 @@ def test_a_failure_of_a_users_system_can_be_waived(night, own):
 @pytest.mark.full
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_function_that_breaks(night, own, fault):
-    """One that raises or exits has failures, code 1; one that ends its process, hangs or is not understood, code 4."""
+    """One that raises, exits or ends its process has failures, code 1; one that hangs or is not understood, code 4."""
     (own / "mine.py").write_text(MINE.replace("camera):\n", f"camera):\n{FAULTS[fault]}\n", 1))
     started = time.monotonic()
     limit = ("--time-limit", 30) if fault == "hangs" else ()
     done, row = night(*QUICK, *OWN, *limit)
     assert time.monotonic() - started < 500.0  # it was not waited for
+    if fault == "ends":
+        assert row["exit"] == 1
+        assert _state(row, "failures")[1].startswith("6 new failures")
+        return
     if fault in ("raises", "exits"):
         assert row["exit"] == 1
         assert _state(row, "failures")[1].startswith("6 new failures: frame 0 in typical/orthogonal/mine:solve")
         assert "6 of 6 rows have the status solver_error; frame 0: " in done.err
         return
     assert row["exit"] == 4
-    told = {"ends": "the process ended before its work was done", "hangs": "did not end within 30 s", "strange": "int"}
+    told = {"hangs": "did not end within 30 s", "strange": "int"}
     assert row["sentence"].startswith("ran: could not run: --solver mine:solve")
     assert told[fault] in row["sentence"]
 
