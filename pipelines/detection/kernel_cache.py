@@ -8,7 +8,6 @@ hash of all of the package's sources, and of what else shapes the machine code a
 from __future__ import annotations
 
 import hashlib
-import os
 import shutil
 import tempfile
 import time
@@ -19,6 +18,8 @@ from pathlib import Path
 import llvmlite
 from numba.core import config
 from numba.misc.appdirs import AppDirs
+
+from eposit.compiled.cache import own_temporary_folder
 
 PACKAGE = Path(__file__).parent
 PREFIX = "eposit-kernels-"
@@ -76,18 +77,6 @@ def numba_keeps_in(folder: Path) -> Iterator[None]:
         yield
     finally:
         config.CACHE_DIR = before  # pyright: ignore[reportAttributeAccessIssue]
-
-
-def own_temporary_folder() -> Path | None:
-    """A folder among the temporary files that only this user can write; None if somebody else has it."""
-    folder = Path(tempfile.gettempdir()) / f"eposit-kernels-{os.getuid() if hasattr(os, 'getuid') else 'own'}"
-    try:
-        folder.mkdir(mode=0o700, exist_ok=True)
-        found = folder.stat()
-    except OSError:
-        return None
-    mine = not hasattr(os, "getuid") or (found.st_uid == os.getuid() and found.st_mode & 0o077 == 0)
-    return folder if mine and not folder.is_symlink() else None
 
 
 def _places(beside: Path) -> Iterator[Path]:

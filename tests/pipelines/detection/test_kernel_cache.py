@@ -9,7 +9,7 @@ import time
 import pytest
 
 from pipelines.detection import kernel_cache
-from pipelines.detection.kernel_cache import PREFIX, choose_folder, own_temporary_folder
+from pipelines.detection.kernel_cache import PREFIX, choose_folder
 
 PART = """
 from pipelines.detection.kernels import inlined
@@ -132,12 +132,3 @@ def test_what_other_packages_keep_stays_where_it_was(checkout):
     with kernel_cache.numba_keeps_in(checkout):
         assert str(checkout) == kernel_cache.config.CACHE_DIR
     assert before == kernel_cache.config.CACHE_DIR
-
-
-def test_a_folder_of_somebody_else_is_not_used(tmp_path, monkeypatch):
-    monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path))
-    folder = own_temporary_folder()
-    assert folder is not None
-    assert folder.stat().st_mode & 0o077 == 0
-    folder.chmod(0o777)
-    assert own_temporary_folder() is None
