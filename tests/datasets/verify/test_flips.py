@@ -15,7 +15,7 @@ from datasets.verify import shard_problem, verify
 from tests.tables import OF_A_RUN
 from tests.wrong_input import first
 
-FEW, SOME, MANY = 12, 40, 1500
+FEW, SOME, MANY = 24, 40, 1500
 SMALL_FILES = ("recipe.toml", "manifest.json")
 
 
@@ -57,7 +57,7 @@ def test_in_a_table(table, count, root, flipping):
             assert problem is not None
             continue
         assert rows.equals(whole)
-    assert found > 0.4 * count  # the rest lies in what Parquet keeps for itself: statistics, sizes, offsets
+    assert found > 0.6 * count  # .8 and more in 40; the rest lies in what Parquet keeps for itself: statistics, offsets
 
 
 @pytest.mark.parametrize("table", OF_A_RUN)
