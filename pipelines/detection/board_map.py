@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -66,6 +66,13 @@ class BoardMap:
         x, y, z = _in_space(places, height, self.lift)
         generic_lens.project(self.R, self.t, self.lens, x, y, z, pixels)
         return pixels[0] if np.ndim(at) == 1 else pixels
+
+    def reduced(self, by: int) -> BoardMap:
+        """The map to a picture whose pixels are means of `by` x `by` pixels of this one's."""
+        lens = self.lens.copy()
+        lens[0] /= by
+        lens[2:4] = (lens[2:4] + 0.5) / by - 0.5
+        return replace(self, lens=lens)
 
     def jacobian(self, at: Array, height: float = 0.0, step: float = 1e-3) -> Array:
         """(m, 2, 2) or (2, 2) px per square; columns are along x and along y."""

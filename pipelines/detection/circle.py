@@ -10,7 +10,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from eposit.arrays import Array, Mask
 from pipelines.detection.board_map import BoardMap, grid
@@ -59,7 +61,12 @@ LOOK_SPREADS = 10.0  # half its axes, in deviations of the prediction: it is far
 GOOD_SHARE = 1.2  # of the residuals of the best fit in the ellipse, up to which a fit from the prediction is kept
 FAR_SPREADS = 3.0  # of the prediction that a circle may lie off, for each that a linear map allows
 SIZE_LIMIT = 0.03  # of the size
+LARGE_RADIUS_PX = 60.0  # a larger circle is read in means of pixels that leave its edges this blur:
+LEAST_BLUR_PX = 0.7  # below it the fine grid would sample them badly
+MOST_RADIUS_PX = 150.0  # a larger one is read in means whatever it costs: 0.03 px instead of 0.01, in bounded time
 LEAST_AXIS = 1.5  # blurs: a disc whose smaller half axis is below this has no edges of its own
+
+Picture = Grey | NDArray[np.float32]  # (height, width) grey values
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,11 +86,36 @@ def find_circle(
     """
     at, height = target.circle_centre[:2] / target.square_mm, target.circle_height_mm / target.square_mm
     radius = target.circle_radius_mm / target.square_mm
-    centre, jacobian = board(at, height), board.jacobian(at, height)
-    if np.linalg.svd(jacobian, compute_uv=False)[-1] * radius < LEAST_AXIS * blur_px:
+    axes = np.linalg.svd(board.jacobian(at, height), compute_uv=False) * radius
+    if axes[-1] < LEAST_AXIS * blur_px:
         return None
+    harmless = min(math.ceil(axes[0] / LARGE_RADIUS_PX), max(1, int(blur_px / LEAST_BLUR_PX)))
+    by = max(harmless, math.ceil(axes[0] / MOST_RADIUS_PX))
+    if by > 1:
+        small = _means(image, by)
+        found = _fitted_circle(small, board.reduced(by), blur_px / by, contrast, target, misfit, _unsure(board, target))
+        return found and Circle((found.centre_px + 0.5) * by - 0.5, found.covariance_px2 * by**2)
+    return _fitted_circle(image, board, blur_px, contrast, target, misfit, _unsure(board, target))
+
+
+def _means(image: Grey, by: int) -> NDArray[np.float32]:
+    """A picture of the means of `by` x `by` pixels; what is left at the right and below is cut off."""
+    height, width = (side // by for side in image.shape)
+    whole = image[: height * by, : width * by].astype(np.float32)
+    return np.asarray(cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA), np.float32)
+
+
+def _fitted_circle(
+    image: Picture, board: BoardMap, blur_px: float, contrast: float, target: Chessboard, misfit: float, unsure: Array
+) -> Circle | None:
+    """The circle in a picture in which it is not too large.
+
+    unsure: (2, 2) covariance of where the board puts it, squares^2.
+    """
+    at, height = target.circle_centre[:2] / target.square_mm, target.circle_height_mm / target.square_mm
+    radius = target.circle_radius_mm / target.square_mm
+    centre, jacobian = board(at, height), board.jacobian(at, height)
     known = _beforehand(contrast, target.circle_height_mm / target.circle_radius_mm, misfit)
-    unsure = _unsure(board, target)
     doubt = _doubt(unsure)
     patches = [
         _patch(image, board, centre, jacobian, blur_px, target, more) for more in ((0.0, doubt) if doubt else (0.0,))
@@ -188,7 +220,7 @@ def _kernel(blur_px: float, finer: int) -> Array:
 
 
 def _patch(
-    image: Grey, board: BoardMap, centre: Array, jacobian: Array, blur_px: float, target: Chessboard, doubt: float
+    image: Picture, board: BoardMap, centre: Array, jacobian: Array, blur_px: float, target: Chessboard, doubt: float
 ) -> Patch | None:
     """The pixels around the circle that see it or its white square; None if it reaches out of the image.
 

@@ -1,11 +1,14 @@
 """The raised circle on pictures by brute force: its projected centre is found, not the centroid of what is seen."""
 
+import cv2
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from pipelines.detection import circle
 from pipelines.detection.board_map import BoardMap, grid
 from pipelines.detection.circle import find_circle
+from pipelines.detection.circle_model import fit_disc
 from render.targets.chessboard import Chessboard
 from tests.supersampled import digitised, picture
 
@@ -107,10 +110,10 @@ def board_with(name, disc=DISC, moved=0.0):
     return image, camera
 
 
-def found_in(image, camera):
+def found_in(image, camera, blur_px=EDGE_BLUR):
     corners = project(camera, grid(TARGET.inner), 0.0)
-    board = BoardMap.fit(grid(TARGET.inner), corners, (WIDTH, TALL), np.ones(len(corners)))
-    return find_circle(image, board, EDGE_BLUR, WHITE - BLACK, TARGET)
+    board = BoardMap.fit(grid(TARGET.inner), corners, image.shape[::-1], np.ones(len(corners)))
+    return find_circle(image, board, blur_px, WHITE - BLACK, TARGET)
 
 
 @pytest.fixture(scope="module")
@@ -180,3 +183,19 @@ def test_a_disc_that_reaches_out_of_the_picture_is_none(drawn):
     left = int(truth[0]) - 8  # the disc's radius is 14 px
     cut = np.ascontiguousarray(image[:, left:])
     assert found_in(digitised(cut, np.random.default_rng(3), 0.0), (R, t, f, centre - [left, 0.0])) is None
+
+
+def test_a_large_circle_is_read_in_a_bounded_number_of_pixels(drawn, monkeypatch):
+    """An enlarged picture has the circle where the small one has it, and its fit has not 36 times as many pixels."""
+    (image, (R, t, f, centre)), by, pixels = drawn["tilted"], 6, []
+
+    def counted(patch, *rest):
+        pixels.append(len(patch.grey))
+        return fit_disc(patch, *rest)
+
+    monkeypatch.setattr(circle, "fit_disc", counted)
+    small = digitised(image, np.random.default_rng(0), 0.0)
+    large = cv2.resize(small, None, fx=by, fy=by, interpolation=cv2.INTER_CUBIC)
+    found = found_in(large, (R, t, by * f, (centre + 0.5) * by - 0.5), by * EDGE_BLUR).centre_px
+    assert np.linalg.norm((found + 0.5) / by - 0.5 - found_in(small, (R, t, f, centre)).centre_px) < 0.02
+    assert max(pixels) < 140**2  # a disc of 60 px radius and the blur around it; it is 210 px wide here
