@@ -25,6 +25,16 @@ def test_datasets_and_render_are_ours():
     assert Path(render.__file__).is_relative_to(ROOT)
 
 
+def test_no_file_has_marks_of_a_merge_that_was_left_open():
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True)
+    if listed.returncode:
+        pytest.skip("this is no checkout")
+    for name in filter(None, listed.stdout.split("\0")):
+        path = ROOT / name
+        if path.suffix in {".py", ".md", ".toml", ".yml", ".js", ".css", ".txt"} and path.is_file():
+            assert not re.search(r"^(<{7} |>{7} )", path.read_text(), re.MULTILINE), name
+
+
 def test_help_loads_nothing_heavy():
     code = (
         "import sys, pipelines.cli, eposit\n"

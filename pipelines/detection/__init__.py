@@ -20,6 +20,7 @@ from pipelines.detection.grey_picture import Grey, grey_picture
 from pipelines.detection.printed import check_seen, find_points, place_points
 from pipelines.detection.seen_points import SeenPoints
 from pipelines.detection.statuses import STATUS_TYPE, PointStatus
+from pipelines.detection.tone_curve import decoded
 from render.targets.chessboard import Chessboard
 from render.targets.kinds import AnyTarget
 from render.targets.printed import PrintedBoard
@@ -104,7 +105,8 @@ def _detect_chessboard(image: Grey, target: Chessboard, detector: str) -> Detect
     if too_many_bad(corners.consistent):
         return _nothing(count, PointStatus.CORNERS_INCONSISTENT, seen.finder)
     misfit = misfit_squares(corners, grid(target.inner)[seen.ids])
-    circle = find_circle(image, corners.board, corners.blur_px, corners.contrast, target, misfit)
+    light = decoded(image, corners.exponent)
+    circle = find_circle(light, corners.board, corners.blur_px, corners.contrast, target, misfit)
     points, covariance = np.full((count, 2), np.nan), np.full((count, 2, 2), np.nan)
     status = np.full(count, PointStatus.POINT_NOT_FOUND, STATUS_TYPE)
     status[seen.ids] = np.where(corners.consistent, PointStatus.OK, PointStatus.CORNERS_INCONSISTENT)

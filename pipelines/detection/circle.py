@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from eposit.arrays import Array, Mask
 from pipelines.detection.board_map import BoardMap, grid
+from pipelines.detection.circle_light import fit_in_any_light
 from pipelines.detection.circle_model import (
     BLOCKED,
     DISC_GREY,
@@ -31,7 +32,6 @@ from pipelines.detection.circle_model import (
     Patch,
     Prior,
     cost_of,
-    fit_disc,
 )
 from pipelines.detection.consistency import Corners
 from pipelines.detection.finders import Grey
@@ -121,7 +121,12 @@ def _fitted_circle(
         _patch(image, board, centre, jacobian, blur_px, target, more) for more in ((0.0, doubt) if doubt else (0.0,))
     ]
     fits = [
-        fit_disc(patch, replace(known, start=_best_start(patch, known, unsure, radius)) if k else known)
+        fit_in_any_light(
+            patch,
+            replace(known, start=_best_start(patch, known, unsure, radius)) if k else known,
+            target.circle_height_mm / target.circle_radius_mm,
+            contrast,
+        )
         for k, patch in enumerate(patches)
         if patch is not None
     ]
@@ -258,6 +263,7 @@ def _patch(
         slope_x=(fine_x - centre[0])[None] / size,
         slope_y=(fine_y - centre[1])[:, None] / size,
         blocked=blocked,
+        shadows=np.empty((0, *blocked.shape)),
         per_px=np.linalg.inv(jacobian) / radius,
         kernel=_kernel(blur_px, finer),
         finer=finer,

@@ -3,7 +3,8 @@
 On a grid finer than the pixels, the picture is k D + (1 - D) (w + g . x - A b - L s): the disc D with grey k over
 white w with a slope g, of which the disc blocks a share b of the surroundings' light, and the lamp's shadow s, a disc
 of the same size, displaced and with a soft rim. It is blurred by a gaussian and sampled at the pixels. k, w, g, A and L
-are linear and solved along; disc and shadow are moved by Levenberg-Marquardt.
+are linear and solved along; disc and shadow are moved by Levenberg-Marquardt. Where there are several lamps or windows,
+further shadows stand for the light from a dozen or two of directions, each with an L of its own.
 
 Where the disc's rim lies in its own shade, no edge can be seen; the model knows that and takes the place from the rest.
 """
@@ -23,10 +24,10 @@ from pipelines.detection.kernels import compiled
 Places = NDArray[np.intp]
 # Numbers of a fit, in order: disc x, y, in radii from where it is expected, its size as a ratio, and by how much it is
 # longer along x than along y and along one diagonal than along the other, as shares; shadow x, y from the foot and the
-# softness of its rim, in radii; then k, w, gx, gy (per radius), A, L in grey values.
+# softness of its rim, in radii; then k, w, gx, gy (per radius), A, L in grey values; then L of m further shadows.
 SHAPE, LINEAR = 8, 6
 SIZE, OBLONG, SHADOW, SOFTNESS = 2, slice(3, 5), slice(5, 7), 7
-DISC_GREY, WHITE_GREY, BLOCKED, LAMP = 8, 9, 12, 13
+DISC_GREY, WHITE_GREY, BLOCKED, LAMP, FURTHER = 8, 9, 12, 13, 14
 MOVES = 5  # numbers that move the disc
 SECTORS = 12  # of the disc's surroundings, whose residuals are held against each other
 USUAL_SCATTER = 1.5  # of these over the noise: a picture that the model explains stays below
@@ -50,6 +51,7 @@ class Patch:
     slope_x: Array  # (1, w) the white's slope along x for a slope of one grey value per radius
     slope_y: Array  # (h, 1) likewise along y
     blocked: Array  # (h, w) share of the surroundings' light that the disc blocks
+    shadows: Array  # (m, h, w) share of the light from further directions that the disc hides; m may be 0
     per_px: Array  # (2, 2) radii per px
     kernel: Array  # (k,) taps of the blur on the fine grid
     finer: int  # cells of the fine grid to a pixel, along each side
@@ -60,8 +62,8 @@ class Prior:
     """What is known before the pixels are looked at."""
 
     start: Array  # (8,) shape to start from
-    mean: Array  # (14,)
-    spread: Array  # (14,) standard deviations
+    mean: Array  # (14 + m,)
+    spread: Array  # (14 + m,) standard deviations
     furthest_shadow: float  # radii
 
 
@@ -69,10 +71,11 @@ class Prior:
 class DiscFit:
     """The fit of one disc."""
 
-    values: Array  # (14,)
-    covariance: Array  # (14, 14)
+    values: Array  # (14 + m,)
+    covariance: Array  # (14 + m, 14 + m)
     converged: bool
     residual: float  # mean square, grey values^2
+    unexplained: float  # factor of the covariance for what the model leaves out; 1 where it explains the picture
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +84,7 @@ class _Picture:
 
     opened: Array  # (h, w) share of a fine cell that the disc leaves open
     shade: Array  # (h, w) share of the lamp that is hidden
-    basis: Array  # (n, 6) pixels for a change of the linear numbers
+    basis: Array  # (n, 6 + m) pixels for a change of the linear numbers
     rim: Array  # (5, h, w) change of `opened` with the disc's x, y, size and form
     edge: Array  # (3, h, w) change of `shade` with its x, y and softness
 
@@ -163,7 +166,7 @@ def fit_disc(patch: Patch, prior: Prior) -> DiscFit:
     The loop is NumPy's, and what takes time is compiled, one function a task: a picture has one circle, and Numba
     would need seconds for the loop.
     """
-    values, trial = np.zeros(SHAPE + LINEAR), np.zeros(SHAPE + LINEAR)
+    values, trial = np.zeros_like(prior.mean), np.zeros_like(prior.mean)
     trial[:SHAPE] = prior.start
     normal, right = np.eye(len(values)), np.zeros(len(values))
     jacobian, best = np.zeros((len(patch.grey), len(values))), np.zeros(len(patch.grey))
@@ -189,17 +192,20 @@ def fit_disc(patch: Patch, prior: Prior) -> DiscFit:
         if right @ step <= STOP * STOP * noise:
             values[:SHAPE] += step[:SHAPE]
             covariance = np.linalg.inv(normal) * noise
-            return DiscFit(
-                values,
-                covariance * _unexplained(patch, jacobian, best, covariance),
-                True,
-                float(best @ best / len(best)),
-            )
+            factor = _unexplained(patch, jacobian, best, covariance)
+            return DiscFit(values, covariance * factor, True, float(best @ best / len(best)), factor)
         trial = values.copy()
         trial[:SHAPE] += np.clip(step[:SHAPE], -FURTHEST_STEP, FURTHEST_STEP)
         trial[SHADOW] = np.clip(trial[SHADOW], -prior.furthest_shadow, prior.furthest_shadow)
         trial[SOFTNESS] = np.clip(trial[SOFTNESS], *SOFTNESS_LIMITS)
-    return DiscFit(values, np.linalg.inv(normal) * noise, False, float(best @ best / len(best)))
+    return DiscFit(values, np.linalg.inv(normal) * noise, False, float(best @ best / len(best)), 1.0)
+
+
+def shadow_of(on_board: Array, place: tuple[float, float], softness: float) -> Array:
+    """(h, w) share of a lamp that the disc hides at places (2, h, w), in radii from its foot."""
+    shape = np.zeros(SHAPE)
+    shape[SHADOW], shape[SOFTNESS] = place, softness
+    return _shadow(on_board, shape)[0]
 
 
 def cost_of(patch: Patch, prior: Prior, shape: Array) -> float:
@@ -214,13 +220,13 @@ def _draw(patch: Patch, shape: Array) -> _Picture:
     opened, rim = _open_share(patch.on_disc, shape, patch.per_px, patch.finer)
     shade, edge = _shadow(patch.on_board, shape)
     white = _at_pixels(patch, opened)
-    under = (patch.slope_x, patch.slope_y, -patch.blocked, -shade)
+    under = (patch.slope_x, patch.slope_y, -patch.blocked, -shade, *-patch.shadows)
     basis = np.column_stack((1.0 - white, white, *(_at_pixels(patch, opened * field) for field in under)))
     return _Picture(opened, shade, basis, rim, edge)
 
 
 def _best_levels(basis: Array, grey: Array, weigh: Array, mean: Array) -> Array:
-    """(6,) linear numbers of least squares with what is known of them beforehand."""
+    """(6 + m,) linear numbers of least squares with what is known of them beforehand."""
     square, side = basis.T @ basis, basis.T @ grey
     square[np.diag_indices_from(square)] += weigh + 1e-9 * square.diagonal()
     return np.linalg.solve(square, side + weigh * mean)
@@ -231,6 +237,7 @@ def _moves(patch: Patch, picture: _Picture, values: Array) -> Array:
     gx, gy = values[WHITE_GREY + 1 : BLOCKED]
     under = values[WHITE_GREY] - values[DISC_GREY] + gx * patch.slope_x + gy * patch.slope_y
     under -= values[BLOCKED] * patch.blocked + values[LAMP] * picture.shade
+    under -= np.tensordot(values[FURTHER:], patch.shadows, 1)
     lamp = -values[LAMP] * picture.opened
     changes = (*(rim * under for rim in picture.rim), *(edge * lamp for edge in picture.edge))
     return np.column_stack([_at_pixels(patch, change) for change in changes])

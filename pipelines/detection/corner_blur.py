@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-from eposit.arrays import Array
-from pipelines.detection.board_map import BoardMap, normal_angles
+from eposit.arrays import Array, Mask
+from pipelines.detection.board_map import BoardMap
 from pipelines.detection.corner_sites import CornerSites
 from pipelines.detection.finders import Grey
 
@@ -22,42 +24,74 @@ LIMITS_PX = (0.4, 6.0)
 SAMPLING = 1.0 / 6.0  # variance that linear interpolation adds, px^2
 FALLBACK_PX = 0.8  # an ordinary lens in focus
 
+Picture = Grey | NDArray[np.float32]  # (height, width) grey values
 
-def measured_blur(image: Grey, board: BoardMap, sites: CornerSites) -> float:
+
+class EdgeProfiles(NamedTuple):
+    """Grey values across edges, as shares between their ends."""
+
+    shares: Array  # (k, s) 0 at the first end and 1 at the last one, but for noise
+    step_px: Array  # (k,) px between samples
+    rises: Mask  # (k,) whether the last end is the bright one
+
+    def flat(self, values: Array) -> Array:
+        """(k,) mean of values (k, s) over both ends, where the edge is not."""
+        ends = _ends(values.shape[1])
+        return 0.5 * (values[:, :ends].mean(axis=1) + values[:, -ends:].mean(axis=1))
+
+
+def measured_blur(image: Picture, board: BoardMap, sites: CornerSites) -> float:
     """Standard deviation, px, of the blur of the edges beside the corners, the pixels' own area included.
 
     An edge's profile q, from 0 to 1, of a blur sigma has the integral of q (1 - q) equal to sigma / sqrt(pi), wherever
     the edge lies in it.
     """
-    at = sites.at[:: max(1, len(sites.at) // MOST_CORNERS)]
-    profiles, step = _profiles(image, board, at, sites.reach)
-    ends = max(2, int(ENDS * profiles.shape[1]))
-    low, high = profiles[:, :ends].mean(axis=1), profiles[:, -ends:].mean(axis=1)
-    contrast = high - low
-    clear = np.abs(contrast) > LEAST_CONTRAST * np.median(np.abs(contrast))
-    if not np.any(clear):
+    profiles = edge_profiles(image, board, sites)
+    if profiles is None:
         return FALLBACK_PX
-    q = (profiles[clear] - low[clear, None]) / contrast[clear, None]
-    product = q * (1.0 - q)
-    flat = 0.5 * (product[:, :ends].mean(axis=1) + product[:, -ends:].mean(axis=1))  # noise alone makes it negative
-    widths = math.sqrt(math.pi) * np.sum(product - np.minimum(flat, 0.0)[:, None], axis=1) * step[clear]
+    product = profiles.shares * (1.0 - profiles.shares)
+    flat = np.minimum(profiles.flat(product), 0.0)  # noise alone makes it negative
+    widths = math.sqrt(math.pi) * np.sum(product - flat[:, None], axis=1) * profiles.step_px
     sigma = float(np.median(widths))
     return float(np.clip(math.sqrt(max(sigma * abs(sigma) - SAMPLING, 0.0)), *LIMITS_PX))
 
 
-def _profiles(image: Grey, board: BoardMap, at: Array, reach: float) -> tuple[Array, Array]:
-    """(k, s) grey values across edges beside corners, and (k,) px between their samples."""
+def edge_profiles(image: Picture, board: BoardMap, sites: CornerSites) -> EdgeProfiles | None:
+    """Profiles of the clear edges beside some of the corners; None if no edge is clear."""
+    at = sites.at[:: max(1, len(sites.at) // MOST_CORNERS)]
+    profiles, step = _profiles(image, board, at, sites.reach)
+    ends = _ends(profiles.shape[1])
+    low, high = profiles[:, :ends].mean(axis=1), profiles[:, -ends:].mean(axis=1)
+    contrast = high - low
+    clear = np.abs(contrast) > LEAST_CONTRAST * np.median(np.abs(contrast))
+    if not np.any(clear):
+        return None
+    return EdgeProfiles(
+        (profiles[clear] - low[clear, None]) / contrast[clear, None], step[clear], contrast[clear] > 0.0
+    )
+
+
+def _ends(samples: int) -> int:
+    """Samples of an end of a profile, which is taken for white or black."""
+    return max(2, int(ENDS * samples))
+
+
+def _profiles(image: Picture, board: BoardMap, at: Array, reach: float) -> tuple[Array, Array]:
+    """(k, s) grey values across edges beside corners, and (k,) px between their samples, square to the edge.
+
+    They run along the board's other axis: square to the edge, one would meet the next edge where the view is slanted.
+    """
     jacobian, middle = board.jacobian(at), board(at)
-    angles = normal_angles(jacobian)
     found: list[Array] = []
     steps: list[Array] = []
     lengths = np.linalg.norm(jacobian, axis=1)
     area = np.abs(np.linalg.det(jacobian))
     count = 2 * int(LONGEST_PX / STEP_PX) + 1
-    for k in range(2):  # edges along x, then along y, and their normals
-        normal = np.stack((np.cos(angles[:, 1 - k]), np.sin(angles[:, 1 - k])), axis=-1)
-        half = np.minimum(LONGEST_PX, reach * area / lengths[:, k])
-        across = np.linspace(-1.0, 1.0, count)[:, None] * (half[:, None] * normal)[:, None]
+    for k in range(2):  # edges along x, then along y
+        square = area / lengths[:, k]  # px, square to the edge
+        half = np.minimum(LONGEST_PX, reach * square)
+        aside = jacobian[:, :, 1 - k] * (half / square)[:, None]
+        across = np.linspace(-1.0, 1.0, count)[:, None] * aside[:, None]
         for way in (1.0, -1.0):
             bases = [middle + way * place * reach * jacobian[:, :, k] for place in PLACES]
             places = np.stack([base[:, None] + across for base in bases]).astype(np.float32)

@@ -49,10 +49,10 @@ class _System(NamedTuple):
     trial: Array  # (9,) shape
 
 
-def fit_corners(image: NDArray[np.uint8], task: CornerTask, steps: int, stop: float) -> CornerFits:
+def fit_corners(image: NDArray[np.float32], task: CornerTask, steps: int, stop: float) -> CornerFits:
     """Fit every corner by Levenberg and Marquardt.
 
-    image: (height, width) 8 bits. stop: step, in standard deviations of what is fitted, at which it has converged.
+    image: (height, width) light. stop: step, in standard deviations of what is fitted, at which it has converged.
     """
     count, most = len(task.starts), (2 * int(np.max(task.windows, initial=0)) + 1) ** 2
     fits = CornerFits(
@@ -166,7 +166,7 @@ def _invert(system: _System, covariance: Array) -> bool:
 
 @compiled
 def _fit_all(
-    image: NDArray[np.uint8],
+    image: NDArray[np.float32],
     task: CornerTask,
     steps: int,
     stop: float,
@@ -232,4 +232,4 @@ def prepare() -> None:
         discs=np.empty((0, 2)),
         disc_axes=np.eye(2),
     )
-    fit_corners(np.zeros((4, 4), np.uint8), nothing, 1, 0.5)
+    fit_corners(np.zeros((4, 4), np.float32), nothing, 1, 0.5)

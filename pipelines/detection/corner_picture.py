@@ -62,7 +62,7 @@ class CornerPixels(NamedTuple):
 
 
 @inlined
-def gather(image: NDArray[np.uint8], task: CornerTask, i: int, pixels: CornerPixels) -> int:
+def gather(image: NDArray[np.float32], task: CornerTask, i: int, pixels: CornerPixels) -> int:
     """Number of the pixels of corner i: within the window, its reach along both axes, beside an edge, off the discs."""
     inverses, reaches, discs, disc_axes = task.inverses, task.reaches, task.discs, task.disc_axes
     clear, window, band = task.clears[i], task.windows[i], task.bands[i]

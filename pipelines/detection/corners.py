@@ -16,6 +16,7 @@ from pipelines.detection.corner_model import fit_corners
 from pipelines.detection.corner_picture import BLUR, CONTRAST, MEAN, SHAPE, SLOPE, CornerTask
 from pipelines.detection.corner_sites import CornerSites
 from pipelines.detection.finders import Grey
+from pipelines.detection.tone_curve import Light, decoded, measured_exponent
 
 STOP = 0.5  # step, in standard deviations, at which a fit has converged; it is still made
 LEAST_CLEAR = 0.5  # of a place's own `clear`, however blurred the print beyond is
@@ -47,15 +48,20 @@ FINAL = _Pass(steps=40, must_converge=True, reach=1.0)
 
 def refine_corners(image: Grey, board: BoardMap, sites: CornerSites) -> Corners:
     """Fit every corner near where `board` puts it, clear of the circle: once near by, then over all of its edges."""
-    at, size = sites.at, (image.shape[1], image.shape[0])
-    corners, shapes = _fit(image, board, sites, _start_shapes(board, at, measured_blur(image, board, sites)), NEAR)
+    at, size, light = sites.at, (image.shape[1], image.shape[0]), decoded(image, 1.0)
+    corners, shapes = _fit(light, board, sites, _start_shapes(board, at, measured_blur(light, board, sites)), NEAR)
+    exponent = 0.0
     for _ in range(2 if len(at) < FEW else 1):
         good = corners.consistent
         if np.mean(~good) > 0.5:
             return corners
         board = _next_map(corners, board, at, size)
+        if not exponent:
+            exponent = measured_exponent(image, board, sites)
+            light = decoded(image, exponent)
         limits = FINAL._replace(reach=_form_reach(corners, board, at))
-        corners, shapes = _fit(image, board, sites, _next_shapes(corners, shapes, board, at), limits)
+        corners, shapes = _fit(light, board, sites, _next_shapes(corners, shapes, board, at), limits)
+    corners = replace(corners, exponent=exponent)
     if np.mean(~corners.consistent) <= 0.5:
         corners = replace(corners, board=_next_map(corners, corners.board, at, size))
     return drop_inconsistent(corners, at, size)
@@ -107,7 +113,7 @@ def _start_shapes(board: BoardMap, at: Array, blur_px: float) -> Array:
     return shapes
 
 
-def _fit(image: Grey, board: BoardMap, sites: CornerSites, shapes: Array, limits: _Pass) -> tuple[Corners, Array]:
+def _fit(image: Light, board: BoardMap, sites: CornerSites, shapes: Array, limits: _Pass) -> tuple[Corners, Array]:
     """One pass over all corners, and their shapes; consistent is what converged to a corner of the right sense."""
     at = sites.at
     jacobian = board.jacobian(at)

@@ -1,6 +1,7 @@
 """Detection on rendered images: accuracy and stated covariances on the demo, disorder, detectors side by side."""
 
 import shutil
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -61,6 +62,20 @@ def of_lens(demo, lens):
 
 def rms(values):
     return np.sqrt(np.mean(values**2, axis=0))
+
+
+def test_a_tone_curve_spoils_nothing(demo):
+    """Taken for light, every third circle of such pictures is 0.2 px off with 0.03 stated, and the others are lost."""
+    curved = replace(RECIPE.sensor, gamma=2.2)
+    for frame, _, truth in demo[:10]:
+        camera = frame.camera.true_camera()
+        light = render_frame(TARGET, RECIPE.light, camera, frame.cam_from_obj, samples=RECIPE.sample_count())
+        found = detect_points(develop(light.full(camera), curved), TARGET)
+        assert set(found.status) == {"ok"}
+        error = found.points_px - truth
+        # Measured 0.004 and 0.018 px at most, as in light.
+        assert rms(error[:CIRCLE]).max() < 0.01
+        assert np.abs(error[CIRCLE]).max() < 0.03
 
 
 def test_every_point_of_the_demo_is_found(detected):

@@ -1,0 +1,51 @@
+"""The raised circle under one lamp and even surroundings, or, where these do not explain it, in light from everywhere.
+
+A room has several lamps and windows. Each casts a shadow of its own, and where the disc's rim lies in one that the
+model lacks, the rim seems to be elsewhere, by a hundredth of the radius and more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pipelines.detection.circle_model import SHAPE, DiscFit, Patch, Prior, cost_of, fit_disc, shadow_of
+
+Rings = tuple[tuple[float, int], ...]
+
+# Rings of shadows: heights by which they are displaced, and how many there are. Few tell whether one lamp is enough.
+FEW, FEW_SOFTNESS = ((0.5, 6), (1.2, 8), (2.4, 8)), 0.3
+MANY, MANY_SOFTNESS = ((0.4, 6), (0.8, 8), (1.2, 10), (1.8, 12), (2.6, 12)), 0.2
+SPREAD = 0.1  # of the contrast: light that may come from each direction beyond that of lamp and surroundings
+MISSING = 1.3  # times as much as is left of the residuals with further shadows: then one lamp does not explain them
+LEFT_OUT = 1.5  # times the stated error of a fit with many shadows: a lamp may stand between two directions
+
+
+def fit_in_any_light(patch: Patch, known: Prior, height: float, contrast: float) -> DiscFit:
+    """The simplest fit that explains the picture.
+
+    Further shadows are taken only where they are needed: each makes the disc's place less certain.
+
+    height: of the circle above the board, radii. contrast: grey values.
+    """
+    plain = fit_disc(patch, known)
+    left = cost_of(*_lit(patch, known, FEW, FEW_SOFTNESS, height, contrast), plain.values[:SHAPE])
+    if plain.residual <= MISSING * left / len(patch.grey):
+        return plain
+    fit = fit_disc(*_lit(patch, known, MANY, MANY_SOFTNESS, height, contrast))
+    return replace(fit, covariance=fit.covariance * LEFT_OUT**2) if fit.converged else plain
+
+
+def _lit(
+    patch: Patch, known: Prior, rings: Rings, softness: float, height: float, contrast: float
+) -> tuple[Patch, Prior]:
+    """The patch and what is known of it with the shadows of lamps all around."""
+    turns = [(ring * height, 2.0 * np.pi * k / count) for ring, count in rings for k in range(count)]
+    places = [(far * float(np.cos(turn)), far * float(np.sin(turn))) for far, turn in turns]
+    shadows = np.array([shadow_of(patch.on_board, place, softness * height) for place in places])
+    mean, spread = np.zeros(len(places)), np.full(len(places), SPREAD * contrast)
+    return (
+        replace(patch, shadows=shadows),
+        replace(known, mean=np.append(known.mean, mean), spread=np.append(known.spread, spread)),
+    )
