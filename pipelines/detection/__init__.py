@@ -46,6 +46,7 @@ class Detection:
     status: NDArray[np.str_]  # (n,) PointStatus values
     finder: str  # finder that saw the board, empty if none
     blur_px: float  # median blur of the edges, NaN if none
+    exponent: float = 1.0  # of the picture's tone curve, see `tone_curve`; 1 if light was found
 
 
 def detect_points(image: NDArray[np.generic], target: AnyTarget, detector: str = Detector.EDGE_FIT) -> Detection:
@@ -115,7 +116,7 @@ def _detect_chessboard(image: Grey, target: Chessboard, detector: str) -> Detect
     status[-1] = PointStatus.CIRCLE_NOT_FOUND
     if circle is not None:
         points[-1], covariance[-1], status[-1] = circle.centre_px, circle.covariance_px2, PointStatus.OK
-    return Detection(points, covariance, status, seen.finder, corners.blur_px)
+    return Detection(points, covariance, status, seen.finder, corners.blur_px, corners.exponent)
 
 
 def _corners(image: Grey, seen: SeenPoints, target: Chessboard, detector: str) -> Corners:

@@ -87,7 +87,7 @@ class PictureModel:
         flow = np.nan_to_num(image_flow(camera, pose, points))
         return PictureModel(target, camera, region, np.flatnonzero(used), grid, flow)
 
-    def observed(self, image: NDArray[np.uint8]) -> Array:
+    def observed(self, image: NDArray[np.uint8] | NDArray[np.float32]) -> Array:
         """(m,) grey values of the used pixels."""
         return image[self.region.pixels].ravel()[self.used].astype(np.float64)
 

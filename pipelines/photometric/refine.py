@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from eposit import Camera, Pose, Status
 from eposit.arrays import Array
 from eposit.pose import rotation_error_vector
+from pipelines.detection.tone_curve import Light
 from pipelines.photometric.covariance import at_least, sandwich
 from pipelines.photometric.image_flow import POSE
 from pipelines.photometric.noise import EDGE_SHARE, Noise
@@ -51,9 +52,14 @@ class _Fit(NamedTuple):
 
 
 def refine(
-    image: NDArray[np.uint8], camera: Camera, target: Chessboard, start: Pose, start_covariance: Array, sigma_px: float
+    light: NDArray[np.uint8] | Light,
+    camera: Camera,
+    target: Chessboard,
+    start: Pose,
+    start_covariance: Array,
+    sigma_px: float,
 ) -> Refined:
-    """The pose at which the model's picture is likest to the image.
+    """The pose at which the model's picture is likest to the light, (height, width) on the scale of grey values.
 
     start: at most about a width of the point spread from the true one. start_covariance: (6, 6) of it.
     sigma_px: width of the point spread to start from.
@@ -66,7 +72,7 @@ def refine(
     steps = 0
     try:
         model = PictureModel.around(target, camera, shape)
-        observed = model.observed(image)
+        observed = model.observed(light)
         at = _Iterate(shape, _first_light(model, shape, observed))
         for steps in range(1, MOST_STEPS + 1):
             fit = _fit(model, at, observed)
