@@ -17,12 +17,14 @@ from eposit.arrays import Array
 from pipelines.detection.board_map import BoardMap
 from pipelines.detection.first_map import FIRM_HOLD
 from pipelines.detection.generic_lens import PARAMETERS
+from pipelines.detection.grid_steps import axes
 from pipelines.detection.identity import AnyChessboard, Placement, identify
-from pipelines.detection.lattice_grid import Grid, axes, grid_of
+from pipelines.detection.lattice_grid import Grid, grid_of
 from pipelines.detection.lattice_growth import contrast_of, grow, look_at, looks, side_of, verified
 from pipelines.detection.levels import LevelOf, levels
 from pipelines.detection.saddle_links import link
-from pipelines.detection.saddles import Level, find_saddles, smooth
+from pipelines.detection.saddles import find_saddles, smooth
+from pipelines.detection.sampling import Level
 from pipelines.detection.square_look import look_at_squares
 from pipelines.detection.statuses import PointStatus
 from render.targets.chessboard import Chessboard

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eposit.arrays import Array
-from pipelines.detection.saddles import Level
+from pipelines.detection.sampling import Level
 from pipelines.detection.textured_region import textured_region
 
 MOST_PART = 0.5  # of the picture, for its textured region to be looked at before the whole

@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from eposit.arrays import Array, Mask
-from pipelines.detection.saddles import Level, Saddles, sample
+from pipelines.detection.grid_steps import STEPS
+from pipelines.detection.saddles import Saddles
+from pipelines.detection.sampling import Level, sample
 
 Indices = NDArray[np.intp]
 
@@ -24,7 +26,6 @@ ALONG_RAD = 0.5  # between an edge at the saddle and the way to the neighbour
 PLACES = (0.3, 0.5, 0.7)  # between two saddles where the edge is looked at
 ASIDE, MOST_ASIDE_PX = 0.2, 4.0  # of the distance: how far from the edge its two sides are looked at
 LEAST_EDGE = 0.25  # of the saddles' swing
-STEPS = ((1, 0), (0, 1), (-1, 0), (0, -1))  # in the lattice, for the four edges in turn
 
 
 class Piece(NamedTuple):

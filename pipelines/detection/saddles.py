@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eposit.arrays import Array, Mask
-
-Level = NDArray[np.float32]  # (height, width) grey values of the picture, reduced or enlarged
+from pipelines.detection.sampling import Level, sample
 
 SMOOTHING_PX = 1.5  # of the picture before its second derivatives are taken
 AROUND_PX = 5  # half side of the square that tells the contrast around a place
@@ -21,7 +20,6 @@ LEAST_STRENGTH = 0.03  # of the saddle over the variance around it; 4 / pi^2 whe
 FLAT_GREY, FLAT_NOISES = 1.0, 4.0  # spread of what counts as flat: grey levels, and standard deviations of the noise
 NOISE_STRIDE = 7  # every so many pixels tell the noise
 MOST_SADDLES = 3000  # the strongest; bounds the work that noise and textures make
-MOST_MAPPED = 30000  # rows of places that OpenCV takes at once
 RING_PX, RING_SAMPLES = 3.5, 32
 LEAST_SWING = 6.0  # noises between the ring's brightest and darkest sample
 OPPOSITE_RAD = 0.7  # how far an edge may bend at the saddle, as seen from the ring
@@ -50,25 +48,6 @@ def find_saddles(smoothed: Level) -> Saddles:
     rows, columns = _peaks(smoothed, xy * xy - xx * yy, noise)
     points = np.stack((columns, rows), axis=1) + _offsets(smoothed, rows, columns, xx, yy, xy)
     return _with_four_sectors(smoothed, points, noise)
-
-
-def sample(level: Level, points: Array) -> Array:
-    """(..., ) grey values at (..., 2) px, bilinear; NaN outside."""
-    if not points.size:
-        return np.empty(points.shape[:-1])
-    flat = np.asarray(points, np.float32).reshape(-1, points.shape[-2], 2)
-    if len(flat) > MOST_MAPPED:
-        half = len(flat) // 2
-        return np.concatenate([sample(level, flat[:half]), sample(level, flat[half:])]).reshape(points.shape[:-1])
-    values = cv2.remap(
-        level,
-        np.ascontiguousarray(flat[..., 0]),
-        np.ascontiguousarray(flat[..., 1]),
-        cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_CONSTANT,
-        borderValue=float("nan"),
-    )
-    return np.asarray(values, np.float64).reshape(points.shape[:-1])
 
 
 def _second(smoothed: Level, dx: int, dy: int) -> Level:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from eposit.arrays import Array, Mask
 from pipelines.detection.board_map import BoardMap
 from pipelines.detection.lattice_grid import Grid
-from pipelines.detection.saddles import Level, sample
+from pipelines.detection.sampling import Level, sample
 
 INNER = np.linspace(-0.42, 0.42, 15)  # squares from a square's middle at which it is looked at, along x and y
 LIGHT_REACH = 1.5  # squares: how far the grey of other squares of its colour counts for a square's own
