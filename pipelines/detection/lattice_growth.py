@@ -30,7 +30,7 @@ def verified(level: Level, grid: Grid) -> Grid:
     if not np.any(use):
         return grid.with_points(points).cropped()
     like, contrast = likeness(level, grid.points[use], along_x[use], along_y[use], grid.signs[use])
-    good = _look_like_corners(like, contrast, float(np.nanmedian(contrast)))
+    good = _look_like_corners(like, contrast, median_of_known(contrast))
     good &= _near(grid.points[use], predicted(grid.points)[use], along_x[use], along_y[use])
     points[use] = np.where(good[:, None], grid.points[use], np.nan)
     return grid.with_points(points).cropped()
@@ -95,8 +95,15 @@ def side_of(along_x: Array, along_y: Array) -> float:
 
 def contrast_of(level: Level, grid: Grid) -> float:
     """Median half difference between white and black at the lattice's points, grey levels."""
-    contrast = looks(level, grid)[1]
-    return float(np.nanmedian(contrast)) if np.any(np.isfinite(contrast)) else 0.0
+    median = median_of_known(looks(level, grid)[1])
+    return median if np.isfinite(median) else 0.0
+
+
+def median_of_known(values: Array) -> float:
+    """Median of those that are not NaN; NaN of none. `np.nanmedian` takes ten times as long."""
+    rising = np.sort(values[np.isfinite(values)])
+    count = len(rising)
+    return float(0.5 * (rising[(count - 1) // 2] + rising[count // 2])) if count else np.nan
 
 
 def looks(level: Level, grid: Grid) -> tuple[Array, Array]:

@@ -118,9 +118,12 @@ def _find_peaks(
     """Maxima of the strength, row by row, and their strengths over the variance around them; returns their number."""
     height, width = smoothed.shape
     least, count = LEAST_STRENGTH * flat / SMOOTHING_PX**4, 0
+    strengths = np.empty(width, np.float32)
     for row in range(MARGIN_PX, height - MARGIN_PX):
+        for column in range(width):  # a loop without branches works on several numbers at once
+            strengths[column] = _strength(xx, yy, xy, row, column)
         for column in range(MARGIN_PX, width - MARGIN_PX):
-            strength = _strength(xx, yy, xy, row, column)
+            strength = strengths[column]
             if strength > least and count < len(rows) and _is_peak(xx, yy, xy, row, column, strength):
                 share = strength * SMOOTHING_PX**4 / (_variance(smoothed, row, column) + flat)
                 if share > LEAST_STRENGTH:
