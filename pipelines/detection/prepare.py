@@ -19,13 +19,14 @@ from pipelines.detection import (
     grid_steps,
     levels,
     saddle_links,
+    saddle_peaks,
     saddles,
     sampling,
 )
 
 MODULES = (  # those with compiled functions; the slowest first
-    corner_model, generic_lens, circle_model, saddles, saddle_links, corner_likeness, circle, grid_steps, levels,
-    sampling,
+    corner_model, generic_lens, circle_model, saddle_links, saddle_peaks, saddles, corner_likeness, circle, grid_steps,
+    levels, sampling,
 )  # fmt: skip
 
 
