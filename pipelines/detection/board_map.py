@@ -153,5 +153,8 @@ def _start(at: Array, corners_px: Array, size: tuple[int, int], use: Mask) -> Bo
     bearings = np.concatenate((offset * side[..., None], np.cos(theta)[..., None]), axis=-1)
     R, t = homography_start(points, bearings)
     maps = [BoardMap(R[i], t[i], np.array([focal[i], 0.0, *centre, 0.0, 0.0, 0.0])) for i in range(len(focal))]
-    misses = [np.sum((board(at[some]) - corners_px[some]) ** 2) for board in maps]
-    return maps[int(np.argmin(misses))]
+    x, y, z = np.ascontiguousarray(points.T)
+    found = np.empty((len(maps), len(some), 2))
+    for board, pixels in zip(maps, found, strict=True):
+        generic_lens.project(board.R, board.t, board.lens, x, y, z, pixels)
+    return maps[int(np.argmin(np.sum((found - corners_px[some]) ** 2, axis=(1, 2))))]

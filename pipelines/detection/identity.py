@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eposit.arrays import Array, Mask
+from eposit.arrays import Array
 from pipelines.detection.square_look import CLEAR, DISC, SIDES, UNKNOWN, Look
 from pipelines.detection.statuses import PointStatus
 from render.targets.chessboard import Chessboard
@@ -89,31 +90,33 @@ def _placements(
     target: AnyChessboard,
 ) -> list[Placement]:
     """All with that turn that lie on the board, with black on black, and its borders where the margin is seen."""
-    corners = turn @ np.array(((0, shape[0] - 1), (0, shape[1] - 1)))
-    low, room = corners.min(axis=1), np.array(target.inner) - 1 - np.ptp(corners, axis=1)
-    if np.any(room < 0):
-        return []
-    x, y = (part.ravel() for part in np.meshgrid(*(np.arange(n + 1) for n in room), indexing="ij"))
-    offsets = np.stack((x, y), axis=1) - low
-    first = np.floor(turn @ (0.5, 0.5) + offsets).astype(np.int64)  # the square between the lattice's first points
-    use = (first.sum(axis=1) % 2 == 1) == white_first
-    for side, ends in zip(SIDES, look.ends, strict=True):
-        if ends:
-            use &= _touches(turn @ side, np.stack((x, y), axis=1), room)
-    return [Placement(turn, offset, _disc_at(turn, offset, look, target)) for offset in offsets[use]]
+    ((a, b), (c, d)), (across, down) = turn.tolist(), (shape[0] - 1, shape[1] - 1)
+    low = min(0, a * across) + min(0, b * down), min(0, c * across) + min(0, d * down)
+    size = (down, across) if b else (across, down)
+    room = target.inner[0] - 1 - size[0], target.inner[1] - 1 - size[1]
+    places = [range(room[0] + 1), range(room[1] + 1)]  # of the lattice's least column and row on the board
+    for (x, y), is_end in zip(SIDES, look.ends, strict=True):
+        if is_end:
+            way = a * x + b * y, c * x + d * y
+            axis = 0 if way[0] else 1
+            place = 0 if way[axis] < 0 else room[axis]
+            places[axis] = places[axis][place : place + 1] if place in places[axis] else range(0)
+    found = []
+    for x in places[0]:
+        for y in places[1]:
+            offset = x - low[0], y - low[1]
+            first = offset[0] + (a + b - 1) // 2 + offset[1] + (c + d - 1) // 2  # column and row of the first square
+            if (first % 2 == 1) == white_first:
+                found.append(Placement(turn, np.array(offset), _disc_at(turn, offset, look, target)))
+    return found
 
 
-def _touches(way: NDArray[np.int64], place: NDArray[np.int64], room: NDArray[np.int64]) -> Mask:
-    """Which places (n, 2) within the room leave none on the board's side that lies that way."""
-    axis = int(np.argmax(np.abs(way)))
-    return place[:, axis] == (0 if way[axis] < 0 else room[axis])
-
-
-def _disc_at(turn: NDArray[np.int64], offset: NDArray[np.int64], look: Look, target: AnyChessboard) -> int:
+def _disc_at(turn: NDArray[np.int64], offset: tuple[int, int], look: Look, target: AnyChessboard) -> int:
     """What is seen where a placement puts the circle; UNKNOWN outside what was looked at, and for a board without."""
     if isinstance(target, PlainChessboard):
         return UNKNOWN
-    middle = np.array(target.circle_square) - 1.5  # the first inner corner is the board's (0, 0)
-    column, row = np.floor(turn.T @ (middle - offset)).astype(np.int64) + 1
+    middle = (square - 1.5 for square in target.circle_square)  # the first inner corner is the board's (0, 0)
+    x, y = (along - shift for along, shift in zip(middle, offset, strict=True))
+    column, row = (math.floor(x * along + y * aside) + 1 for along, aside in turn.T.tolist())
     rows, columns = look.discs.shape
     return int(look.discs[row, column]) if 0 <= row < rows and 0 <= column < columns else UNKNOWN

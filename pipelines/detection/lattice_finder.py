@@ -17,12 +17,14 @@ from eposit.arrays import Array
 from pipelines.detection.board_map import BoardMap
 from pipelines.detection.first_map import FIRM_HOLD
 from pipelines.detection.generic_lens import PARAMETERS
+from pipelines.detection.grid_steps import axes
 from pipelines.detection.identity import AnyChessboard, Placement, identify
-from pipelines.detection.lattice_grid import Grid, axes, grid_of
-from pipelines.detection.lattice_growth import contrast_of, grow, look_at, looks, side_of, verified
+from pipelines.detection.lattice_grid import Grid, grid_of
+from pipelines.detection.lattice_growth import contrast_of, grow, look_at, looks, median_of_known, side_of, verified
 from pipelines.detection.levels import LevelOf, levels
 from pipelines.detection.saddle_links import link
-from pipelines.detection.saddles import Level, find_saddles, smooth
+from pipelines.detection.saddles import find_saddles, smooth
+from pipelines.detection.sampling import Level
 from pipelines.detection.square_look import look_at_squares
 from pipelines.detection.statuses import PointStatus
 from render.targets.chessboard import Chessboard
@@ -126,10 +128,10 @@ def _told(level: LevelOf, smoothed: Level, grid: Grid, target: AnyChessboard) ->
 def _firm_part(smoothed: Level, grid: Grid) -> Grid:
     """The lattice up to the last columns and rows with more than one point that looks much like a corner."""
     like, contrast = looks(smoothed, grid)
-    if not np.any(np.isfinite(like)) or np.nanmedian(like) < LEAST_TYPICAL:
+    typical = median_of_known(like)
+    if not typical >= LEAST_TYPICAL:
         return grid.with_points(np.full_like(grid.points, np.nan)).cropped()
-    with np.errstate(invalid="ignore"):
-        firm = (like > FIRM * np.nanmedian(like)) & (contrast > FIRM_CONTRAST * np.nanmedian(contrast))
+    firm = (like > FIRM * typical) & (contrast > FIRM_CONTRAST * median_of_known(contrast))  # NaN is not
     rows, columns = np.flatnonzero(firm.sum(axis=1) > 1), np.flatnonzero(firm.sum(axis=0) > 1)
     points = np.full_like(grid.points, np.nan)
     if len(rows) and len(columns):

@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eposit.arrays import Array, Mask
-from pipelines.detection.lattice_grid import Grid, axes, likeness, predicted
-from pipelines.detection.saddles import Level
+from pipelines.detection.corner_likeness import likeness, most_likely
+from pipelines.detection.grid_steps import axes, predicted
+from pipelines.detection.lattice_grid import Grid
+from pipelines.detection.sampling import Level
 
 LEAST_LIKENESS = 0.72  # half a corner at the edge of what covers the other half has 0.71
 LEAST_CONTRAST = 0.3  # of the lattice's median
-SEARCH = np.array([-0.24, -0.12, 0.0, 0.12, 0.24])  # squares around the predicted place, along x and y
 FARTHEST = 0.36  # squares from the predicted place that a corner may lie
 LONGEST_RATIO = 3.0  # between neighbouring sides
 WINDOW_SHARE, LEAST_WINDOW_PX, MOST_WINDOW_PX = 0.25, 2, 6  # half side of the window in which a corner is centred
@@ -29,7 +30,7 @@ def verified(level: Level, grid: Grid) -> Grid:
     if not np.any(use):
         return grid.with_points(points).cropped()
     like, contrast = likeness(level, grid.points[use], along_x[use], along_y[use], grid.signs[use])
-    good = _look_like_corners(like, contrast, float(np.nanmedian(contrast)))
+    good = _look_like_corners(like, contrast, median_of_known(contrast))
     good &= _near(grid.points[use], predicted(grid.points)[use], along_x[use], along_y[use])
     points[use] = np.where(good[:, None], grid.points[use], np.nan)
     return grid.with_points(points).cropped()
@@ -61,22 +62,12 @@ def look_at(level: Level, grid: Grid, expected: Array, contrast: float, farthest
     if not np.any(use):
         return out
     at, ax, ay, signs = expected[use], along_x[use], along_y[use], grid.signs[use]
-    best = _most_likely(level, at, ax, ay, signs)
+    best = most_likely(level, at, ax, ay, signs)
     found = centred(level, best, side_of(ax, ay))
     like, has = likeness(level, found, ax, ay, signs)
     good = _look_like_corners(like, has, contrast) & _near(found, at, ax, ay, farthest)
     out[use] = np.where(good[:, None], found, np.nan)
     return out
-
-
-def _most_likely(level: Level, at: Array, along_x: Array, along_y: Array, signs: Array) -> Array:
-    """(n, 2) px of what looks most like a corner around (n, 2) px."""
-    u, v = np.tile(SEARCH, len(SEARCH)), np.repeat(SEARCH, len(SEARCH))
-    tries = at[:, None] + u[:, None] * along_x[:, None] + v[:, None] * along_y[:, None]
-    each = [np.repeat(part, len(u), axis=0) for part in (along_x, along_y, signs)]
-    like = likeness(level, tries.reshape(-1, 2), each[0], each[1], each[2])[0].reshape(tries.shape[:2])
-    best = np.nan_to_num(like, nan=-1.0).argmax(axis=1)
-    return tries[np.arange(len(at)), best]
 
 
 def centred(level: Level | NDArray[np.uint8], points: Array, side_px: float) -> Array:
@@ -104,8 +95,15 @@ def side_of(along_x: Array, along_y: Array) -> float:
 
 def contrast_of(level: Level, grid: Grid) -> float:
     """Median half difference between white and black at the lattice's points, grey levels."""
-    contrast = looks(level, grid)[1]
-    return float(np.nanmedian(contrast)) if np.any(np.isfinite(contrast)) else 0.0
+    median = median_of_known(looks(level, grid)[1])
+    return median if np.isfinite(median) else 0.0
+
+
+def median_of_known(values: Array) -> float:
+    """Median of those that are not NaN; NaN of none. `np.nanmedian` takes ten times as long."""
+    rising = np.sort(values[np.isfinite(values)])
+    count = len(rising)
+    return float(0.5 * (rising[(count - 1) // 2] + rising[count // 2])) if count else np.nan
 
 
 def looks(level: Level, grid: Grid) -> tuple[Array, Array]:

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from eposit.arrays import Array
-from pipelines.detection.saddles import Level
+from pipelines.detection.grey_picture import Grey
+from pipelines.detection.kernels import compiled
+from pipelines.detection.sampling import Level
 from pipelines.detection.textured_region import textured_region
 
 MOST_PART = 0.5  # of the picture, for its textured region to be looked at before the whole
@@ -38,47 +39,62 @@ class LevelOf:
         return (points - self.first_px + 0.5) / self.scale - 0.5
 
 
-def levels(image: NDArray[np.uint8]) -> Iterator[LevelOf]:
+def levels(image: Grey) -> Iterator[LevelOf]:
     """The levels of an 8-bit picture (height, width); none of one that is too small for a board."""
     if min(image.shape) < LEAST_PICTURE_PX:
         return
     region = textured_region(image)
-    part, first_px = image[region.pixels].astype(np.float32), np.array([region.x, region.y], np.float64)
+    part, first_px = np.ascontiguousarray(image[region.pixels]), np.array([region.x, region.y], np.float64)
     if part.size < MOST_PART * image.size:
         yield _reduced(part, _first_scale(part), first_px)
-    whole = image.astype(np.float32)
-    first = _first_scale(whole)
+    first = _first_scale(image)
     finer = [first // 2**k for k in range(1, first.bit_length())]
-    yield from (_reduced(whole, scale) for scale in [first, *finer[:1]])
+    yield from (_reduced(image, scale) for scale in [first, *finer[:1]])
     coarser = 2 * first
-    while min(whole.shape) / coarser >= LEAST_SIDE_PX:
-        yield _reduced(whole, coarser)
+    while min(image.shape) / coarser >= LEAST_SIDE_PX:
+        yield _reduced(image, coarser)
         coarser *= 2
     for scale in finer[1:]:
-        if whole.size / scale**2 <= MOST_PIXELS:
-            yield _reduced(whole, scale)
+        if image.size / scale**2 <= MOST_PIXELS:
+            yield _reduced(image, scale)
         elif part.size / scale**2 <= MOST_PIXELS:
             yield _reduced(part, scale, first_px)
     enlargement = min(ENLARGEMENT, float(np.sqrt(ENLARGED_PIXELS / part.size)))
     if enlargement >= LEAST_ENLARGEMENT:
-        large = cv2.resize(part, None, fx=enlargement, fy=enlargement, interpolation=cv2.INTER_CUBIC)
+        large = cv2.resize(part.astype(np.float32), None, fx=enlargement, fy=enlargement, interpolation=cv2.INTER_CUBIC)
         yield LevelOf(np.asarray(large, np.float32), 1.0 / enlargement, first_px)
 
 
-def _first_scale(whole: Level) -> int:
+def _first_scale(whole: Grey) -> int:
     scale = 1
     while whole.size / scale**2 > FIRST_PIXELS:
         scale *= 2
     return scale
 
 
-def _reduced(whole: Level, scale: int, first_px: Array | None = None) -> LevelOf:
+def _reduced(whole: Grey, scale: int, first_px: Array | None = None) -> LevelOf:
     """Means over squares of pixels; what is left over at the right and at the bottom is left out."""
     origin = np.zeros(2) if first_px is None else first_px
     if scale == 1:
-        return LevelOf(whole, 1.0, origin)
-    height, width = (size // scale for size in whole.shape)
-    part = whole[: height * scale, : width * scale]
-    return LevelOf(
-        np.asarray(cv2.resize(part, (width, height), interpolation=cv2.INTER_AREA), np.float32), float(scale), origin
-    )
+        return LevelOf(whole.astype(np.float32), 1.0, origin)
+    out = np.empty((whole.shape[0] // scale, whole.shape[1] // scale), np.float32)
+    _reduce(whole, scale, out)
+    return LevelOf(out, float(scale), origin)
+
+
+@compiled
+def _reduce(whole: Grey, scale: int, out: Level) -> None:
+    """Means over squares of pixels. A scale that is a power of two and no more than 256 gives them exactly."""
+    share = np.float32(1.0 / (scale * scale))
+    for row in range(out.shape[0]):
+        for column in range(out.shape[1]):
+            total = 0
+            for y in range(scale):
+                for x in range(scale):
+                    total += whole[row * scale + y, column * scale + x]
+            out[row, column] = np.float32(total) * share
+
+
+def prepare() -> None:
+    """Call the compiled function once."""
+    _reduced(np.zeros((4, 4), np.uint8), 2)

@@ -10,9 +10,24 @@ from typing import Any
 
 from numba.core import event
 
-from pipelines.detection import circle, circle_model, corner_model, generic_lens
+from pipelines.detection import (
+    circle,
+    circle_model,
+    corner_likeness,
+    corner_model,
+    generic_lens,
+    grid_steps,
+    levels,
+    saddle_links,
+    saddle_peaks,
+    saddles,
+    sampling,
+)
 
-MODULES = (corner_model, generic_lens, circle_model, circle)  # those with compiled functions; the slowest first
+MODULES = (  # those with compiled functions; the slowest first
+    corner_model, generic_lens, circle_model, saddle_links, saddle_peaks, saddles, corner_likeness, circle, grid_steps,
+    levels, sampling,
+)  # fmt: skip
 
 
 def compile_kernels(

@@ -6,7 +6,7 @@ with its bright side on the same side. So neighbours of a chessboard have black 
 
 from __future__ import annotations
 
-from collections import deque
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +14,10 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from eposit.arrays import Array, Mask
-from pipelines.detection.saddles import Level, Saddles, sample
+from pipelines.detection.grid_steps import STEPS
+from pipelines.detection.kernels import compiled, compiled_part
+from pipelines.detection.saddles import Saddles
+from pipelines.detection.sampling import Level, grey_at
 
 Indices = NDArray[np.intp]
 
@@ -24,7 +27,6 @@ ALONG_RAD = 0.5  # between an edge at the saddle and the way to the neighbour
 PLACES = (0.3, 0.5, 0.7)  # between two saddles where the edge is looked at
 ASIDE, MOST_ASIDE_PX = 0.2, 4.0  # of the distance: how far from the edge its two sides are looked at
 LEAST_EDGE = 0.25  # of the saddles' swing
-STEPS = ((1, 0), (0, 1), (-1, 0), (0, -1))  # in the lattice, for the four edges in turn
 
 
 class Piece(NamedTuple):
@@ -37,86 +39,133 @@ class Piece(NamedTuple):
 
 def link(smoothed: Level, saddles: Saddles) -> list[Piece]:
     """Pieces of lattices of at least two by two saddles, the largest first."""
-    if len(saddles.points) < 4:
+    n = len(saddles.points)
+    if n < 4:
         return []
-    neighbour, back = _mutual(*_nearest(smoothed, saddles))
-    left, pieces = np.ones(len(neighbour), bool), []
-    for first in range(len(neighbour)):
-        if left[first]:
-            piece = _spread(first, neighbour, back, saddles, left)
-            if len(piece.points) >= 4 and np.all(np.ptp(piece.cells, axis=0) > 0):
-                pieces.append(piece)
-    return sorted(pieces, key=lambda piece: -len(piece.points))
-
-
-def _wrapped(angle: Array) -> Array:
-    return (angle + np.pi) % (2.0 * np.pi) - np.pi
-
-
-def _brightens(saddles: Saddles, which: Indices, edge: Indices) -> Mask:
-    """Whether grey values rise with the angle across the edge of that number."""
-    return saddles.brightens[which] ^ (edge % 2 == 1)
-
-
-def _nearest(smoothed: Level, saddles: Saddles) -> tuple[Indices, Indices]:
-    """(n, 4) nearest saddle along each edge, -1 for none, and (n, 4) which of its edges leads back."""
-    points, n = saddles.points, len(saddles.points)
-    count = min(NEAREST + 1, n)
-    distance, other = (np.asarray(part)[:, 1:].ravel() for part in cKDTree(points).query(points, k=count))
-    own = np.repeat(np.arange(n), count - 1)
-    way = points[other] - points[own]
-    angle = np.arctan2(way[:, 1], way[:, 0])
-    apart, back_apart = (
-        np.abs(_wrapped(saddles.angles[which] - towards[:, None]))
-        for which, towards in ((own, angle), (other, angle + np.pi))
+    distance, other = (np.asarray(part) for part in cKDTree(saddles.points).query(saddles.points, min(NEAREST + 1, n)))
+    neighbour, back = np.full((n, 4), -1), np.full((n, 4), -1)
+    _find_neighbours(smoothed, *saddles, distance, other, neighbour, back)
+    members, cells, ends = np.empty(n, np.int64), np.empty((n, 2), np.int64), np.empty(n, np.int64)
+    count = _spread_all(neighbour, back, members, cells, ends, np.zeros(n, bool), np.empty(n, np.int64))
+    bounds = np.append(0, ends[:count])
+    parts = [slice(bounds[k], bounds[k + 1]) for k in np.argsort(-np.diff(bounds), kind="stable")]
+    pieces = (
+        Piece(cells[part], saddles.points[members[part]], bool(saddles.brightens[members[part.start]]))
+        for part in parts
+        if part.stop - part.start >= 4
     )
-    edge, back = apart.argmin(axis=1), back_apart.argmin(axis=1)
-    fits = (apart.min(axis=1) < ALONG_RAD) & (back_apart.min(axis=1) < ALONG_RAD) & (distance >= LEAST_SIDE_PX)
-    fits &= _brightens(saddles, own, edge) != _brightens(saddles, other, back)
-    kept = np.flatnonzero(fits)
-    kept = kept[_has_edge(smoothed, saddles, own[kept], other[kept], _brightens(saddles, own[kept], edge[kept]))]
-    neighbour, leads = np.full((n, 4), -1), np.full((n, 4), -1)
-    kept = kept[np.argsort(-distance[kept], kind="stable")]  # the nearest is written last
-    neighbour[own[kept], edge[kept]], leads[own[kept], edge[kept]] = other[kept], back[kept]
-    return neighbour, leads
+    return [piece for piece in pieces if np.all(np.ptp(piece.cells, axis=0) > 0)]
 
 
-def _has_edge(smoothed: Level, saddles: Saddles, own: Indices, other: Indices, brightens: Mask) -> Mask:
-    """Whether the edge goes on between two saddles, bright on the side to which the angle rises or on the other."""
-    start, way = saddles.points[own], saddles.points[other] - saddles.points[own]
-    length = np.linalg.norm(way, axis=1)
-    aside = np.stack((-way[:, 1], way[:, 0]), axis=1) * np.minimum(ASIDE, MOST_ASIDE_PX / length)[:, None]
-    along = start[:, None] + np.array(PLACES)[:, None] * way[:, None]
-    step = sample(smoothed, along + aside[:, None]) - sample(smoothed, along - aside[:, None])
-    least = LEAST_EDGE * np.minimum(saddles.swing[own], saddles.swing[other])
-    return np.all(np.where(brightens[:, None], step, -step) > least[:, None], axis=1)
+@compiled
+def _find_neighbours(
+    smoothed: Level,
+    points: Array,
+    angles: Array,
+    brightens: Mask,
+    swing: Array,
+    distance: Array,
+    other: Indices,
+    neighbour: Indices,
+    back: Indices,
+) -> None:
+    """Fill in the nearest saddle along each edge, and which of its edges leads back; -1 stays where there is none.
 
-
-def _mutual(neighbour: Indices, back: Indices) -> tuple[Indices, Indices]:
-    """Only those neighbours that have each other."""
-    own = np.arange(len(neighbour))[:, None]
-    both = (neighbour >= 0) & (neighbour[neighbour, back] == own)
-    return np.where(both, neighbour, -1), np.where(both, back, -1)
-
-
-def _spread(first: int, neighbour: Indices, back: Indices, saddles: Saddles, left: Mask) -> Piece:
-    """The saddles that can be reached from one, step by step; where two claim a place the first has it."""
-    left[first] = False
-    cell_of, turn_of = {first: (0, 0)}, {first: 0}  # a saddle's edge k is the lattice's direction k + turn
-    taken, queue = {(0, 0)}, deque([first])
-    while queue:
-        own = queue.popleft()
-        (x, y), turn = cell_of[own], turn_of[own]
-        for edge in range(4):
-            other = int(neighbour[own, edge])
-            direction = (edge + turn) % 4
-            cell = (x + STEPS[direction][0], y + STEPS[direction][1])
-            if other < 0 or not left[other] or cell in taken:
+    distance, other: (n, k) of the nearest saddles, from the saddle itself on.
+    """
+    for own in range(len(points)):
+        for k in range(1, other.shape[1]):
+            far, away = other[own, k], distance[own, k]
+            if away < LEAST_SIDE_PX:
                 continue
-            left[other] = False
-            cell_of[other], turn_of[other] = cell, (direction + 2 - int(back[own, edge])) % 4
-            taken.add(cell)
-            queue.append(other)
-    members = np.array(list(cell_of))
-    cells = np.array(list(cell_of.values()), np.int64)
-    return Piece(cells, saddles.points[members], bool(saddles.brightens[first]))
+            angle = math.atan2(points[far, 1] - points[own, 1], points[far, 0] - points[own, 0])
+            edge, leads = _edge_along(angles[own], angle), _edge_along(angles[far], angle + math.pi)
+            if edge < 0 or leads < 0 or neighbour[own, edge] >= 0:
+                continue
+            rises = brightens[own] != (edge % 2 == 1)  # whether grey values rise with the angle across the edge
+            if rises == (brightens[far] != (leads % 2 == 1)):
+                continue
+            least = LEAST_EDGE * min(swing[own], swing[far])
+            if _least_step(smoothed, points, own, far, away, 1.0 if rises else -1.0) > least:
+                neighbour[own, edge], back[own, edge] = far, leads
+
+
+@compiled_part
+def _edge_along(angles: Array, towards: float) -> int:
+    """Number of the edge that leaves in a direction; -1 for none."""
+    best, least = -1, ALONG_RAD
+    for k in range(4):
+        apart = abs((angles[k] - towards + math.pi) % (2.0 * math.pi) - math.pi)
+        if apart < least:
+            best, least = k, apart
+    return best
+
+
+@compiled_part
+def _least_step(smoothed: Level, points: Array, own: int, far: int, length: float, sense: float) -> float:
+    """The least difference of grey values between the two sides of the edge from one saddle to another."""
+    x, y = points[own, 0], points[own, 1]
+    way_x, way_y = points[far, 0] - x, points[far, 1] - y
+    share = min(ASIDE, MOST_ASIDE_PX / length)
+    aside_x, aside_y = -way_y * share, way_x * share
+    least = np.inf
+    for place in PLACES:
+        u, v = x + place * way_x, y + place * way_y
+        step = sense * (grey_at(smoothed, u + aside_x, v + aside_y) - grey_at(smoothed, u - aside_x, v - aside_y))
+        if not step >= least:  # NaN counts as the least
+            least = step
+        if math.isnan(least):
+            break
+    return least
+
+
+@compiled
+def _spread_all(
+    neighbour: Indices, back: Indices, members: Indices, cells: Indices, ends: Indices, taken: Mask, turns: Indices
+) -> int:
+    """Fill in the saddles piece by piece, their places in the piece's lattice, and where each piece ends among them.
+
+    From the first saddle of a piece on, those that can be reached are added step by step; where two claim a place the
+    first has it. Only those are neighbours that have each other. Returns the number of pieces.
+
+    taken: (n,) all false. turns: (n,) workspace: a saddle's edge k is the lattice's direction k + turn.
+    """
+    pieces, end = 0, 0
+    for first in range(len(neighbour)):
+        if taken[first]:
+            continue
+        begin, at = end, end
+        taken[first] = True
+        members[end], cells[end, 0], cells[end, 1], turns[end] = first, 0, 0, 0
+        end += 1
+        while at < end:
+            own = members[at]
+            for edge in range(4):
+                other, leads = neighbour[own, edge], back[own, edge]
+                if other < 0 or taken[other] or neighbour[other, leads] != own:
+                    continue
+                way = (edge + turns[at]) % 4
+                x, y = cells[at, 0] + STEPS[way][0], cells[at, 1] + STEPS[way][1]
+                if _is_claimed(cells, begin, end, x, y):
+                    continue
+                taken[other] = True
+                members[end], cells[end, 0], cells[end, 1], turns[end] = other, x, y, (way + 2 - leads) % 4
+                end += 1
+            at += 1
+        ends[pieces] = end
+        pieces += 1
+    return pieces
+
+
+@compiled_part
+def _is_claimed(cells: Indices, begin: int, end: int, x: int, y: int) -> bool:
+    k = begin
+    while k < end and (cells[k, 0] != x or cells[k, 1] != y):
+        k += 1
+    return k < end
+
+
+def prepare() -> None:
+    """Call each compiled function once."""
+    points = np.zeros((4, 2))
+    link(np.zeros((2, 2), np.float32), Saddles(points, np.zeros((4, 4)), np.zeros(4, bool), np.zeros(4)))

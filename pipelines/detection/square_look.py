@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from eposit.arrays import Array, Mask
 from pipelines.detection.board_map import BoardMap
 from pipelines.detection.lattice_grid import Grid
-from pipelines.detection.saddles import Level, sample
+from pipelines.detection.sampling import Level, sample
 
 INNER = np.linspace(-0.42, 0.42, 15)  # squares from a square's middle at which it is looked at, along x and y
+PLACES = np.stack([part.ravel() for part in np.meshgrid(INNER, INNER)], axis=-1)
 LIGHT_REACH = 1.5  # squares: how far the grey of other squares of its colour counts for a square's own
 CLEAR_SHARE = 0.2  # of the disc's area: a square with less darkness holds no disc
 UNEVEN = 0.2  # darkness that light and noise make on white
@@ -33,7 +34,7 @@ class Look:
     """Of a lattice of (rows, columns) points. The square at row 0, column 0 lies before the first point."""
 
     discs: NDArray[np.int64]  # (rows + 1, columns + 1) CLEAR, DISC or UNKNOWN, which every black square is
-    ends: tuple[bool, bool, bool, bool]  # whether the margin is seen on each of the SIDES
+    ends: tuple[bool, ...]  # whether the margin is seen on each of the SIDES
 
 
 def look_at_squares(level: Level, board: BoardMap, grid: Grid, radius: float | None, margin: float) -> Look:
@@ -44,20 +45,15 @@ def look_at_squares(level: Level, board: BoardMap, grid: Grid, radius: float | N
     """
     rows, columns = grid.points.shape[:2]
     x, y = np.meshgrid(np.arange(columns + 1) - 0.5, np.arange(rows + 1) - 0.5)
-    middles = np.stack((x, y), axis=-1)
-    v, u = np.meshgrid(INNER, INNER, indexing="ij")
-    places = middles[:, :, None] + np.stack((u.ravel(), v.ravel()), axis=-1)
-    grey = sample(level, board(places.reshape(-1, 2)).reshape(*places.shape[:2], -1, 2).reshape(-1, places.shape[2], 2))
-    grey = grey.reshape(rows + 1, columns + 1, -1)
+    places = np.stack((x, y), axis=-1)[:, :, None] + PLACES
+    grey = sample(level, board(places.reshape(-1, 2))).reshape(rows + 1, columns + 1, -1)
     white = (np.add.outer(np.arange(rows + 1), np.arange(columns + 1)) % 2 == 0) == grid.white_first
     levels = _levels(grey, white)
     discs = np.full(white.shape, UNKNOWN)
     if radius is not None:
         dark = (levels[1][..., None] - grey) / np.maximum(levels[1] - levels[0], 1e-6)[..., None]
         discs[white] = _classified(dark[white], radius)
-    middle = levels.mean(axis=0)
-    ends = [_ends(level, board, side, white, middle, margin) for side in SIDES]
-    return Look(discs, (ends[0], ends[1], ends[2], ends[3]))
+    return Look(discs, _ends(level, board, white, levels.mean(axis=0), margin))
 
 
 def _levels(grey: Array, white: Mask) -> Array:
@@ -65,7 +61,8 @@ def _levels(grey: Array, white: Mask) -> Array:
     rows, columns = white.shape
     y, x = np.mgrid[0:rows, 0:columns]
     inner = (y > 0) & (y < rows - 1) & (x > 0) & (x < columns - 1)
-    median = np.median(grey, axis=-1)
+    half = grey.shape[-1] // 2
+    median = np.where(np.isfinite(grey).all(axis=-1), np.partition(grey, half, axis=-1)[..., half], np.nan)
     levels = np.full((2, rows, columns), np.nan)
     for colour in (False, True):
         some = inner & (white == colour) & np.isfinite(median)
@@ -81,7 +78,7 @@ def _classified(dark: Array, radius: float) -> NDArray[np.int64]:
 
     Of blurred discs the darkness is summed, which is as much as that of sharp ones.
     """
-    v, u = (part.ravel() for part in np.meshgrid(INNER, INNER, indexing="ij"))
+    u, v = PLACES.T
     area = float(np.mean(np.hypot(u, v) < radius))
     whole, dark = np.isfinite(dark).all(axis=1), np.clip(dark - UNEVEN, 0.0, 1.0) / (1.0 - UNEVEN)
     share, total = dark.mean(axis=1) / area, np.maximum(dark.sum(axis=1), 1e-6)
@@ -92,24 +89,33 @@ def _classified(dark: Array, radius: float) -> NDArray[np.int64]:
     return np.where(whole & disc, DISC, np.where(whole & (share < CLEAR_SHARE), CLEAR, UNKNOWN))
 
 
-def _ends(level: Level, board: BoardMap, side: tuple[int, int], white: Mask, middle: Array, margin: float) -> bool:
-    """Whether the squares on one side are the board's last: what lies beyond them is white, beyond white ones, too."""
+def _ends(level: Level, board: BoardMap, white: Mask, middle: Array, margin: float) -> tuple[bool, ...]:
+    """On which of the SIDES the squares are the board's last.
+
+    What lies beyond them is white there, beyond white ones, too.
+    """
     if margin < LEAST_MARGIN:
-        return False
-    rows, columns = white.shape
+        return (False,) * len(SIDES)
     beyond = min(BEYOND * margin, MOST_BEYOND)
-    if side[0]:
-        line, count = (slice(None), 0 if side[0] < 0 else columns - 1), rows
-    else:
-        line, count = (0 if side[1] < 0 else rows - 1, slice(None)), columns
+    places = [_beside(side, white.shape, way) for side in SIDES for way in (-beyond, beyond)]  # within, then beyond
+    grey = sample(level, board(np.concatenate(places).reshape(-1, 2))).reshape(-1, len(BESIDE)).mean(axis=1)
+    parts = np.split(grey, np.cumsum([len(part) for part in places])[:-1])
+    lines = ((slice(None), 0), (slice(None), -1), (0, slice(None)), (-1, slice(None)))  # of the squares on each side
+    return tuple(_is_end(parts[2 * k], parts[2 * k + 1], white[line], middle[line]) for k, line in enumerate(lines))
+
+
+def _beside(side: tuple[int, int], squares: tuple[int, int], way: float) -> Array:
+    """(n, 3, 2) places along a side, `way` squares further out than the last squares reach."""
+    rows, columns = squares
+    along = (np.arange(rows if side[0] else columns) - 0.5)[:, None] + BESIDE
     border = -1.0 if sum(side) < 0 else (columns if side[0] else rows) - 1.0
-    along = (np.arange(count) - 0.5)[:, None] + BESIDE
-    grey = []
-    for way in (-beyond, beyond):  # within the squares, then beyond them
-        across = np.full(along.shape, border + way * sum(side))
-        places = np.stack((across, along) if side[0] else (along, across), axis=-1)
-        grey.append(sample(level, board(places.reshape(-1, 2)).reshape(places.shape)).mean(axis=1))
-    seen = np.isfinite(grey[0]) & np.isfinite(grey[1])
-    passing = ((grey[0] > middle[line]) == white[line]) & (grey[1] > middle[line])
-    enough = np.sum(seen & white[line]) >= 1 and np.sum(seen & ~white[line]) >= 1 and np.sum(seen) >= LEAST_SQUARES
+    across = np.full(along.shape, border + way * sum(side))
+    return np.stack((across, along) if side[0] else (along, across), axis=-1)
+
+
+def _is_end(within: Array, beyond: Array, white: Mask, middle: Array) -> bool:
+    """Whether squares (n,) are the board's last, by the grey values in them and beyond them."""
+    seen = np.isfinite(within) & np.isfinite(beyond)
+    passing = ((within > middle) == white) & (beyond > middle)
+    enough = np.sum(seen & white) >= 1 and np.sum(seen & ~white) >= 1 and np.sum(seen) >= LEAST_SQUARES
     return bool(enough and np.mean(passing[seen]) >= LEAST_PASSING)
