@@ -8,6 +8,7 @@ import numpy as np
 
 from eposit.arrays import Array, Mask
 from pipelines.detection.board_map import BoardMap
+from pipelines.detection.corner_scatter import leverage, scatter_about, scatter_of_neighbours
 
 LIMIT_PX = 0.5  # largest distance of a corner from the map through the others
 LIMIT_SHARE = 0.03  # or this share of the local square, whichever is more
@@ -15,7 +16,6 @@ LIMIT_SPREADS, MOST_SHARE = 4.0, 0.15  # or so many median distances, up to this
 SHARP_SPREADS, SHARP_PX = 12.0, 0.1  # but no more than so many median distances, nor less than this: beside what covers
 # a part of the board a corner may be half a pixel off where all others agree to a hundredth
 BAD_SHARE = 0.25  # of the corners that may be inconsistent before the board is, and one of few in any case
-PRIOR_FREEDOM = 10.0  # degrees of freedom with which the pixels' own noise counts against the corners' scatter
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +31,23 @@ class Corners:
     exponent: float = 1.0  # of the picture's tone curve, see `tone_curve`
 
 
-def drop_inconsistent(corners: Corners, at: Array, size: tuple[int, int], prior: float = PRIOR_FREEDOM) -> Corners:
-    """Drop the corner farthest from the map through the others until all the rest agree; scale the covariances."""
+def drop_inconsistent(corners: Corners, at: Array, size: tuple[int, int]) -> Corners:
+    """Drop the corner farthest from the map through the others until all the rest agree; scale the covariances.
+
+    Corners that are fitted to their own pixels lie where these show them, also where the board's map is a little wrong.
+    So the covariances are scaled by what differs from corner to corner.
+    """
+    agreed = _agreeing(corners, at, size)
+    good = agreed.consistent
+    if not np.any(good):
+        return agreed
+    parts = (at, agreed.points_px - agreed.board(at), agreed.covariance_px2, agreed.board.slopes(at))
+    factor = scatter_of_neighbours(*(part[good] for part in parts))
+    return replace(agreed, covariance_px2=agreed.covariance_px2 * factor)
+
+
+def _agreeing(corners: Corners, at: Array, size: tuple[int, int]) -> Corners:
+    """The corners of which each agrees with the map through the others, and that map."""
     good, points = corners.consistent.copy(), corners.points_px
     side = np.sqrt(np.abs(np.linalg.det(corners.board.jacobian(at))))
     board = corners.board
@@ -47,8 +62,7 @@ def drop_inconsistent(corners: Corners, at: Array, size: tuple[int, int], prior:
         if excess[worst] <= 1.0:
             break
         good[worst] = False
-    factor = _scatter(corners, board, at, good, prior)
-    return replace(corners, covariance_px2=corners.covariance_px2 * factor, consistent=good, board=board)
+    return replace(corners, consistent=good, board=board)
 
 
 def _limits(side: Array, typical: float) -> Array:
@@ -69,7 +83,12 @@ def check_placed(points_px: Array, fitted: Corners, at: Array, size: tuple[int, 
     """
     same = np.repeat(np.eye(2)[None], len(at), axis=0)
     started = replace(fitted, points_px=points_px, covariance_px2=same, consistent=np.ones(len(at), bool))
-    return drop_inconsistent(started, at, size, prior=0.0)
+    agreed = _agreeing(started, at, size)
+    good = agreed.consistent
+    if not np.any(good):
+        return agreed
+    factor = scatter_about(agreed.board.slopes(at)[good], (points_px - agreed.board(at))[good], same[good])
+    return replace(agreed, covariance_px2=same * factor)
 
 
 def _weights(covariance: Array, good: Mask) -> Array:
@@ -82,24 +101,5 @@ def _left_out(points: Array, board: BoardMap, at: Array, weights: Array) -> Arra
     """(n,) distance of each corner from the map fitted to the others, px."""
     slopes = board.slopes(at)
     scaled = (slopes * np.sqrt(weights)[:, None, None]).reshape(-1, slopes.shape[-1])
-    leverage = _leverage(scaled).reshape(-1, 2).max(axis=1)
-    return np.linalg.norm(points - board(at), axis=1) / np.maximum(1.0 - leverage, 1e-3)
-
-
-def _scatter(corners: Corners, board: BoardMap, at: Array, use: Mask, prior: float) -> float:
-    """Mean square of the corners' distances from the map, in units of their covariances.
-
-    What the pixels' noise cannot tell is in here: rounding that runs along an edge, and what a model leaves out.
-    """
-    whitener = np.linalg.cholesky(np.linalg.inv(corners.covariance_px2[use])).transpose(0, 2, 1)
-    residuals = (whitener @ (corners.points_px - board(at))[use][..., None]).ravel()
-    slopes = (whitener @ board.slopes(at)[use]).reshape(len(residuals), -1)
-    free = len(residuals) - float(_leverage(slopes).sum())
-    return float((np.sum(residuals**2) + prior) / (free + prior))
-
-
-def _leverage(slopes: Array) -> Array:
-    """(m,) diagonal of the hat matrix of (m, k) rows, of which some columns may say the same."""
-    size = np.linalg.norm(slopes, axis=0)
-    left, singular, _ = np.linalg.svd(slopes / np.where(size > 0.0, size, 1.0), full_matrices=False)
-    return np.sum(left[:, singular > 1e-9 * singular[0]] ** 2, axis=1)
+    own = leverage(scaled).reshape(-1, 2).max(axis=1)
+    return np.linalg.norm(points - board(at), axis=1) / np.maximum(1.0 - own, 1e-3)

@@ -61,15 +61,18 @@ def test_edges_without_any_blur_are_placed_by_the_share_of_each_pixel(shift):
 
 
 def test_sharpened_pictures_are_not_refused():
-    """Halos are not in the model: they widen the stated error."""
+    """Halos are not in the model, but alike along all edges: the stated error says how far corners are off."""
     image, truth = drawn(30.0, 20.0, cells=6)
     grey = image.astype(np.float64)
     sharpened = np.clip(np.rint(grey + 1.5 * (grey - gaussian_filter(grey, 1.2))), 0, 255).astype(np.uint8)
     board = BoardMap.fit(CORNERS, truth, image.shape[::-1], np.ones(54))
-    plain, found = (refine_corners(one, board, chessboard_sites(TARGET)) for one in (image, sharpened))
+    found = refine_corners(sharpened, board, chessboard_sites(TARGET))
     assert found.consistent.all()
-    assert np.sqrt(np.mean((found.points_px - truth) ** 2)) < 0.02
-    assert np.median(found.covariance_px2[:, 0, 0]) > 1.5 * np.median(plain.covariance_px2[:, 0, 0])
+    error = found.points_px - truth
+    assert np.sqrt(np.mean(error**2)) < 0.02
+    normalised = np.einsum("ni,nij,nj->n", error, np.linalg.inv(found.covariance_px2), error) / 2.0
+    # 108 numbers tell their mean square to 0.14. Measured 0.90.
+    assert 0.6 < normalised.mean() < 1.5
 
 
 @pytest.mark.parametrize("blur", [0.8, 2.0, 4.0])
