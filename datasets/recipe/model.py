@@ -11,7 +11,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, field_validator, model_validator
 
 from datasets.errors import UserError, did_you_mean
 from datasets.recipe.camera_sets import SUFFIX, resolved
@@ -57,7 +57,8 @@ class Recipe(BaseModel):
         Field(
             ge=1,
             le=10000,
-            description="frames in one shard; a sixteenth of all, at least 10 and at most 200, if left out",
+            description="frames in one shard; if left out a sixteenth of all, at least 10, at most 1000 or as many as "
+            "have 400 million pixels",
         ),
     ] = None
     allow_cropped: Annotated[bool, Field(description="whether target points may lie outside the image")] = False
@@ -79,6 +80,7 @@ class Recipe(BaseModel):
         tuple[CameraSpec, ...],
         Field(min_length=1, description='the cameras, or the name of a set such as "paper"; each sees every pose'),
     ]
+    _most_shard_frames: int | None = PrivateAttr(default=None)
 
     @field_validator("samples")
     @classmethod
@@ -145,6 +147,17 @@ class Recipe(BaseModel):
                 f'recipe {self.name} has the target {self.target.pattern!r}; this needs pattern = "chessboard"'
             )
         return self.target
+
+    @property
+    def most_shard_frames(self) -> int | None:
+        """Most frames that a shard has where `shard_frames` is left out; None is today's rule."""
+        return self._most_shard_frames
+
+    def with_most_shard_frames(self, most: int) -> Recipe:
+        """The same recipe, hash included, for a dataset that was cut by an earlier rule."""
+        cut = self.model_copy()
+        cut._most_shard_frames = most
+        return cut
 
     def __hash__(self) -> int:
         return hash(self.digest())

@@ -21,7 +21,7 @@ from datasets.schema import FRAME_ID, READABLE, SCHEMA_VERSION, TABLES
 from datasets.store.atomic import replace_atomically, write_text
 from datasets.store.card import card
 from datasets.store.digest import table_digest
-from datasets.store.keys import fault_of_keys, numbers_of
+from datasets.store.keys import fault_of_keys, numbers_of, order_of
 from datasets.store.linear_images import are_kept
 from datasets.store.manifest import MANIFEST_FILE, manifest_text, shard_entry
 from datasets.store.nulls import with_nulls
@@ -162,7 +162,8 @@ class Dataset:
 
     def shards(self, table: str) -> list[Path]:
         """Finished shards of a table, in order."""
-        return sorted(path for path in (self.root / table).glob("*.parquet") if SHARD_NAME.fullmatch(path.name))
+        found = (path for path in (self.root / table).glob("*.parquet") if SHARD_NAME.fullmatch(path.name))
+        return sorted(found, key=order_of)
 
     def read(self, table: str, columns: list[str] | None = None) -> pa.Table:
         """All rows of a table in order.

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
-from datasets.plan import frame_count, shard_count, shard_frames
+from datasets.plan import frame_ids_of_shard, shard_count
 from datasets.recipe.model import Recipe
 from datasets.schema import FRAME_ID
 
@@ -24,8 +24,7 @@ def fault_of_keys(recipe: Recipe, path: Path, rows: pa.Table) -> str | None:
     index, count = numbers_of(path)
     if count != shard_count(recipe) or index >= count:
         return f"it is shard {index} of {count}, and the recipe has {shard_count(recipe)}"
-    first, size = index * shard_frames(recipe), shard_frames(recipe)
-    planned = np.arange(first, min(first + size, frame_count(recipe)))
+    planned = np.array(frame_ids_of_shard(recipe, index))
     points = len(recipe.target.points)
     repeats = _repeats(path.parent.name, points, len(rows), len(planned))
     if repeats < 1 or not np.array_equal(rows[FRAME_ID].to_numpy(), np.repeat(planned, repeats)):
@@ -41,6 +40,12 @@ def numbers_of(path: Path) -> tuple[int, int]:
     """The number of a shard and how many there are, from its name."""
     _, number, _, count = path.stem.rsplit("-", 3)
     return int(number), int(count)
+
+
+def order_of(path: Path) -> str:
+    """What sorts shards by their names: a text in which numbers have as many digits, however large they are."""
+    variant, number, _, count = path.stem.rsplit("-", 3)
+    return f"{variant}-{int(number):012d}-of-{int(count):012d}"
 
 
 def _repeats(table: str, points: int, rows: int, frames: int) -> int:

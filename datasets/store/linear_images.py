@@ -134,12 +134,12 @@ def settle_kept(root: Path, *, keep: bool) -> None:
 def masters(root: Path, recipe: Recipe) -> Iterator[tuple[Path, str]]:
     """Path and key of every frame's linear image."""
     for frame in plan(recipe):
-        yield root / linear_path(frame), linear_key(recipe, frame)
+        yield root / linear_path(frame.frame_id), linear_key(recipe, frame)
 
 
-def linear_path(frame: Frame) -> str:
+def linear_path(frame_id: int) -> str:
     """Path of a frame's linear image in its dataset's folder."""
-    return f"{MASTERS}/{frame.frame_id:06d}.exr"
+    return f"{MASTERS}/{frame_id:06d}.exr"
 
 
 def linear_key(recipe: Recipe, frame: Frame) -> str:

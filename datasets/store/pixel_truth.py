@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from datasets.plan import Frame
 from datasets.recipe.outputs import Layer
 from datasets.store.exr_file import write_exr
 from render.truth.pixels import PixelTruth
@@ -18,9 +17,9 @@ TRUTH = "truth"  # the folder
 OBJECTS_KEY = "objects"  # in the header: names of the objects as JSON, the first has id 1
 
 
-def truth_path(frame: Frame) -> str:
+def truth_path(frame_id: int) -> str:
     """Path of a frame's truth in its dataset's folder."""
-    return f"{TRUTH}/{frame.frame_id:06d}.exr"
+    return f"{TRUTH}/{frame_id:06d}.exr"
 
 
 def write_truth(truth: PixelTruth, layers: Iterable[Layer], path: Path) -> None:

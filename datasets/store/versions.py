@@ -8,12 +8,15 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from datasets.plan import shard_count
 from datasets.recipe.model import Recipe
 from datasets.schema import LATER_COLUMNS, SCORES_ADDED, TABLES
 from datasets.store.nulls import with_nulls
+from datasets.store.refusals import SHARD_NAME
 from datasets.store.shard_file import RECIPE_KEY, UNREADABLE, has_digests
 
 OLD_SHARD_FRAMES = 10  # of a recipe without `shard_frames`, when the version was 2
+OLD_MOST_SHARD_FRAMES = 200  # of such a recipe, before large datasets of small pictures had more
 
 
 def upgraded(rows: pa.Table, table: str) -> pa.Table:
@@ -40,12 +43,23 @@ def with_later_columns(rows: pa.Table, table: str) -> pa.Table:
 def as_begun(recipe: Recipe, root: Path) -> Recipe:
     """A recipe as a folder's shards were made, if there are any: one without `shard_frames` meant 10 in version 2.
 
-    The footers tell: they carry the hash of the recipe with the number that was meant.
+    The footers tell: they carry the hash of the recipe with the number that was meant. Later the number was not in the
+    hash, and at most 200: then the files' names tell.
     """
     if recipe.shard_frames is not None:
         return recipe
     old = recipe.model_copy(update={"shard_frames": OLD_SHARD_FRAMES})
-    return old if old.digest() in _carried(root) else recipe
+    if old.digest() in _carried(root):
+        return old
+    cut_before = recipe.with_most_shard_frames(OLD_MOST_SHARD_FRAMES)
+    counts = {shard_count(recipe), shard_count(cut_before)}
+    return cut_before if len(counts) == 2 and _count_in_names(root) == shard_count(cut_before) else recipe
+
+
+def _count_in_names(root: Path) -> int | None:
+    """How many shards a folder's files say that there are; None of a folder without any."""
+    names = (path.name for path in sorted((root / "frames").glob("[!.]*.parquet")))
+    return next((int(found[2]) for found in map(SHARD_NAME.fullmatch, names) if found), None)
 
 
 def without_digests(root: Path) -> bool:

@@ -47,8 +47,8 @@ class FieldAngles:
         for name in ("field_deg", "distance_mm", *(() if counted else ("azimuth_deg",))):
             if not getattr(self, name):
                 raise ValueError(f"trajectory {name} is an empty list; give at least one")
-        if len(self.field_deg) * len(self.distance_mm) * len(self.azimuths) > MAX_POSES:
-            raise ValueError("trajectory has more than a million poses; give fewer angles or distances")
+        if self.count > MAX_POSES:
+            raise ValueError(f"trajectory has more than {MAX_POSES} poses; give fewer angles or distances")
 
     def _check_values(self) -> None:
         for angle in self.field_deg:
@@ -61,21 +61,26 @@ class FieldAngles:
             raise ValueError(f"trajectory extra_tilt_deg is {self.extra_tilt_deg}; it must lie in 0 to 85 degrees")
 
     @property
-    def azimuths(self) -> tuple[float, ...]:
-        """Angles about the optical axis, degrees."""
-        given = self.azimuth_deg
-        return tuple(360.0 * i / given for i in range(given)) if isinstance(given, int) else given
+    def count(self) -> int:
+        """Number of poses."""
+        return len(self.field_deg) * len(self.distance_mm) * self._azimuths
 
-    def poses(self, target: Target) -> list[Pose]:
-        """Poses, field angles outermost, azimuths innermost."""
-        return [
-            self._pose(np.deg2rad(field), distance, np.deg2rad(azimuth), target)
-            for field in self.field_deg
-            for distance in self.distance_mm
-            for azimuth in self.azimuths
-        ]
+    @property
+    def _azimuths(self) -> int:
+        return self.azimuth_deg if isinstance(self.azimuth_deg, int) else len(self.azimuth_deg)
 
-    def _pose(self, field: float, distance: float, azimuth: float, target: Target) -> Pose:
+    def azimuth(self, i: int) -> float:
+        """An angle about the optical axis, degrees."""
+        return 360.0 * i / self.azimuth_deg if isinstance(self.azimuth_deg, int) else self.azimuth_deg[i]
+
+    def pose(self, pose_id: int, target: Target) -> Pose:
+        """A pose by its number, field angles outermost, azimuths innermost."""
+        rest, azimuth = divmod(pose_id, self._azimuths)
+        field, distance = divmod(rest, len(self.distance_mm))
+        angles = np.deg2rad(self.field_deg[field]), np.deg2rad(self.azimuth(azimuth))
+        return self._facing(*angles, self.distance_mm[distance], target)
+
+    def _facing(self, field: float, azimuth: float, distance: float, target: Target) -> Pose:
         across = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
         outwards = np.array([np.cos(field) * np.cos(azimuth), np.cos(field) * np.sin(azimuth), -np.sin(field)])
         ray = np.cross(outwards, across)

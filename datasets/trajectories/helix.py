@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from datasets.trajectories.view import KIND_MEANING, PosedFrame
+from datasets.trajectories.view import KIND_MEANING, MAX_POSES, PosedFrame
 from eposit import Pose
 from eposit.arrays import Array
 from eposit.pose import rotation_error_vector, rotation_from_euler
@@ -50,12 +50,21 @@ class Helix:
             raise ValueError(f"trajectory step is {self.step}; it must be above 0 s")
         if not self.stop >= self.start:
             raise ValueError(f"trajectory stop is {self.stop} and start {self.start}; stop must not come first")
-        if (self.stop - self.start) / self.step > 1e6:
-            raise ValueError("trajectory has more than a million frames; use a larger step")
+        if (self.stop - self.start) / self.step > MAX_POSES:
+            raise ValueError(f"trajectory has more than {MAX_POSES} poses; use a larger step")
+
+    @property
+    def count(self) -> int:
+        """Number of poses."""
+        return int(np.floor((self.stop - self.start) / self.step + 1e-9)) + 1
+
+    def time_s(self, pose_id: int) -> float:
+        """Time of a pose, s."""
+        return self.start + self.step * pose_id
 
     def times(self) -> Array:
-        """Times of the frames, s."""
-        return self.start + self.step * np.arange(int(np.floor((self.stop - self.start) / self.step + 1e-9)) + 1)
+        """(count,) times of all poses, s."""
+        return np.array([self.time_s(pose_id) for pose_id in range(self.count)])
 
     def cam_from_obj(self, time_s: float, target: Target) -> Pose:
         """Pose of the object frame at a time; t is the position of the target's origin, mm."""

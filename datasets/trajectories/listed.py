@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
 
-from datasets.trajectories.view import KIND_MEANING, MAX_POSES, SPEED_MEANING, TURN_MEANING, check_hand
+from datasets.trajectories.view import KIND_MEANING, MAX_LISTED, SPEED_MEANING, TURN_MEANING, check_hand
 from eposit import Pose
 from eposit.pose import rotation_from_euler
 from render.sensor.presets import SensorModel
@@ -53,11 +52,15 @@ class Listed:
     turn_deg_per_s: Annotated[float, TURN_MEANING] = 10.0
 
     def __post_init__(self) -> None:
-        if not 1 <= len(self.poses) <= MAX_POSES:
-            raise ValueError(f"trajectory poses lists {len(self.poses)}; give 1 to {MAX_POSES}")
+        if not 1 <= len(self.poses) <= MAX_LISTED:
+            raise ValueError(f"trajectory poses lists {len(self.poses)}; give 1 to {MAX_LISTED}")
         check_hand(self.speed_mm_per_s, self.turn_deg_per_s)
 
-    def stands(self, target: Target) -> Iterator[tuple[Pose, float | None]]:
-        """Each pose with its own radius of defocus, px, if it has one."""
-        for pose in self.poses:
-            yield pose.cam_from_obj(target), pose.defocus_radius_px
+    @property
+    def count(self) -> int:
+        """Number of poses."""
+        return len(self.poses)
+
+    def pose(self, pose_id: int, target: Target) -> Pose:
+        """A pose by its number."""
+        return self.poses[pose_id].cam_from_obj(target)

@@ -11,7 +11,8 @@ from eposit.arrays import Array
 from render.motion import PoseRate
 from render.targets import Target
 
-MAX_POSES = 1_000_000
+MAX_POSES = 10_000_000_000  # of a path, whose poses are computed one by one
+MAX_LISTED = 1_000_000  # which every process holds
 KIND_MEANING = "helix, field, scatter or listed"
 SPEED_MEANING = "speed of the hand-held board's centre in a random direction, mm/s; 0 stands still"
 TURN_MEANING = "rate at which the hand-held board turns about a random axis, degrees/s"

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from datasets.plan import plan
+from datasets.plan import frame_count, plan
 from datasets.store.baked_light import FILE, FOLDER, light_key
 from datasets.store.dataset import Dataset
 from datasets.store.exr_file import DamagedExrError, Header, read_exr
@@ -45,7 +46,7 @@ def _masters(dataset: Dataset) -> Iterator[Problem]:
 
 def _truth(dataset: Dataset) -> Iterator[Problem]:
     for frame in plan(dataset.recipe):
-        path = dataset.root / truth_path(frame)
+        path = dataset.root / truth_path(frame.frame_id)
         if not path.is_file():
             yield missing_file(path)
             continue
@@ -69,11 +70,11 @@ def _light(dataset: Dataset) -> Iterator[Problem]:
 
 
 def _unplanned(dataset: Dataset) -> Iterator[Problem]:
-    frames = plan(dataset.recipe)
-    planned = {dataset.root / place(frame) for place in (linear_path, truth_path) for frame in frames}
-    for folder in (MASTERS, TRUTH):
+    frames = frame_count(dataset.recipe)
+    for folder, place in ((MASTERS, linear_path), (TRUTH, truth_path)):
         for path in sorted((dataset.root / folder).glob("[!.]*.exr")):
-            if path not in planned:
+            number = int(path.stem) if re.fullmatch("[0-9]{6,12}", path.stem) else frames
+            if number >= frames or path != dataset.root / place(number):
                 yield unplanned_file(path, dataset.root)
 
 

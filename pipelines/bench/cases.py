@@ -26,11 +26,12 @@ def chosen_poses(recipe: Recipe, poses: int) -> list[int]:
 
 def chosen_frames(recipe: Recipe, poses: int) -> dict[str, list[Frame]]:
     """Frames of each camera, by its name."""
-    chosen = chosen_poses(recipe, poses)
-    return {
-        camera.name: [frame for frame in plan(recipe) if frame.pose_id in chosen and frame.camera.name == camera.name]
-        for camera in recipe.cameras
-    }
+    chosen = set(chosen_poses(recipe, poses))
+    found: dict[str, list[Frame]] = {camera.name: [] for camera in recipe.cameras}
+    for frame in plan(recipe):
+        if frame.pose_id in chosen:
+            found[frame.camera.name].append(frame)
+    return found
 
 
 def linear_of(recipe: Recipe, frame: Frame, samples: int | None = None) -> LinearImage:

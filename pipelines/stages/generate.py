@@ -12,7 +12,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from datasets.errors import UserError
-from datasets.plan import Frame, frames_of_shard, shard_count
+from datasets.plan import Frame, frame_ids_of_shard, frames_of_shard, shard_count
 from datasets.recipe.model import Recipe
 from datasets.rows import pose_columns, table
 from datasets.schema import FRAMES, KEYPOINTS, MOTION_COLUMNS, WORLD_PREFIX
@@ -44,8 +44,8 @@ def is_done(dataset: Dataset, index: int) -> bool:
         return False
     files = [linear_path] if are_kept(dataset.root) else []
     files += [truth_path] if dataset.recipe.outputs.aovs else []
-    chosen = frames_of_shard(dataset.recipe, index)
-    return all((dataset.root / path_of(frame)).is_file() for path_of in files for frame in chosen)
+    chosen = frame_ids_of_shard(dataset.recipe, index)
+    return all((dataset.root / path_of(frame_id)).is_file() for path_of in files for frame_id in chosen)
 
 
 def run_shard(dataset: Dataset, index: int, advance: Callable[[], None] = lambda: None) -> None:
@@ -66,7 +66,7 @@ def run_shard(dataset: Dataset, index: int, advance: Callable[[], None] = lambda
             dataset.write_shard(path, made)
     if not are_kept(dataset.root):
         for frame in chosen:  # of another dataset, put there by `--reuse`
-            (dataset.root / linear_path(frame)).unlink(missing_ok=True)
+            (dataset.root / linear_path(frame.frame_id)).unlink(missing_ok=True)
 
 
 def _makers(
@@ -103,7 +103,7 @@ def _traced(recipe: Recipe, frame: Frame) -> _Traced:
 def _light(dataset: Dataset, frame: Frame) -> tuple[LinearImage, bool]:
     """The frame's linear light, and whether it is new: read if it is there and made from the same things."""
     try:
-        return read_linear(dataset.root / linear_path(frame), linear_key(dataset.recipe, frame)), False
+        return read_linear(dataset.root / linear_path(frame.frame_id), linear_key(dataset.recipe, frame)), False
     except LinearImageError:
         return _rendered(dataset.recipe, frame, dataset.root), True
 
@@ -158,12 +158,12 @@ def _finish(
 ) -> dict[str, object]:
     """Write the linear image if it is new and the truth if there is any, develop, and make the frame's row."""
     recipe, spec = dataset.recipe, frame.camera
-    path = dataset.root / linear_path(frame)
+    path = dataset.root / linear_path(frame.frame_id)
     try:
         if is_new and are_kept(dataset.root):
             write_linear(linear, spec.true_camera(), path, linear_key(recipe, frame))
         if truth is not None:
-            path = dataset.root / truth_path(frame)
+            path = dataset.root / truth_path(frame.frame_id)
             if not path.is_file():
                 write_truth(truth, recipe.outputs.aovs, path)
     except OSError as error:
@@ -199,8 +199,8 @@ def _row(recipe: Recipe, frame: Frame, region: Region, image: NDArray[np.uint8])
         **dict(zip((f"region_{a}_px" for a in Region._fields), region, strict=True)),
         "render_seed": frame.render_seed,
         "sensor_seed": frame.sensor_seed,
-        "master": linear_path(frame),
-        "truth": truth_path(frame) if recipe.outputs.aovs else None,
+        "master": linear_path(frame.frame_id),
+        "truth": truth_path(frame.frame_id) if recipe.outputs.aovs else None,
         **drawn,
         **_motion_columns(frame.cam_from_obj),
     }

@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
-from datasets.plan import frames_of_shard
+from datasets.plan import frame_ids_of_shard
 from datasets.store.atomic import write_text
 from datasets.store.dataset import Dataset
 from datasets.store.quarantine import FAILED, QUARANTINE
@@ -36,7 +36,7 @@ class Stage(Generic[Shard]):
 
     def steps(self, dataset: Dataset, shard: Any) -> int:
         """How far a shard moves the bar: by its frames, or by one."""
-        return len(frames_of_shard(dataset.recipe, shard)) if self.by_frame else 1
+        return len(frame_ids_of_shard(dataset.recipe, shard)) if self.by_frame else 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,8 +117,8 @@ def _note_failure(stage: str, dataset: Dataset, execution: Execution, shard: Any
     index = dataset.index_of(shard) if isinstance(shard, Path) else shard
     name = re.sub(r"[^A-Za-z0-9._@+-]", "-", stage)
     note = dataset.root / QUARANTINE / FAILED / f"{name}-{index:05d}.txt"
-    frames = frames_of_shard(dataset.recipe, index)
-    told = f"{stage}, frames {frames[0].frame_id} to {frames[-1].frame_id}: {failure.reason}"
+    frames = frame_ids_of_shard(dataset.recipe, index)
+    told = f"{stage}, frames {frames[0]} to {frames[-1]}: {failure.reason}"
     write_text(note, f"{told}\n\n{failure.trace}")
     execution.failures.append(ShardFailure(stage, index, told, note))
 

@@ -115,7 +115,7 @@ def old_default(place, cli, monkeypatch):
     (root / "recipe.toml").write_text(text)
     make_old(root)
     (root / "manifest.json").unlink()
-    monkeypatch.setattr("datasets.plan.LEAST_SHARD_FRAMES", 1)  # today's default cuts two frames into two shards
+    monkeypatch.setattr("datasets.plan.shards.LEAST_SHARD_FRAMES", 1)  # today's default cuts two frames into two shards
     return place.recipe(text), root
 
 
@@ -151,3 +151,18 @@ def test_a_version_that_is_not_known_is_one_sentence_and_stays(table, place, cli
     done = cli("verify", root)
     assert_one_sentence(done.code, done.err, UNSUPPORTED)
     assert shards(root) == before
+
+
+def test_a_dataset_that_was_cut_by_an_earlier_rule_goes_on(place, cli, monkeypatch):
+    recipe, root = place.recipe(place.text.replace("shard_frames = 1\n", "")), place.new()
+    with monkeypatch.context() as earlier:
+        earlier.setattr("datasets.plan.shards.LEAST_SHARD_FRAMES", 1)
+        assert cli("generate", recipe, "--out", root, "--reuse", place.source, "-q").code == 0
+    names = sorted(path.name for path in shards(root))
+    assert len(names) == 4
+    assert cli("verify", root).code == 2  # today's rule makes one shard of two frames
+    monkeypatch.setattr("datasets.store.versions.OLD_MOST_SHARD_FRAMES", 1)
+    assert "all 2 shards are there" in cli("generate", recipe, "--out", root).out
+    assert cli("detect", root, "-q").code == 0
+    assert cli("verify", root).code == 0
+    assert len(shards(root)) == 6

@@ -45,10 +45,10 @@ def centre(pose):
 
 def test_field_angles_distances_and_azimuths_are_those_given():
     path = FieldAngles(field_deg=(0.0, 35.0, 80.0), distance_mm=(700.0, 1500.0), azimuth_deg=(10.0, 190.0))
-    poses = iter(path.poses(TARGET))
+    poses = (path.pose(i, TARGET) for i in range(path.count))
     for field in path.field_deg:
         for distance in path.distance_mm:
-            for azimuth in path.azimuths:
+            for azimuth in path.azimuth_deg:
                 pose = next(poses)
                 place = centre(pose)
                 assert np.linalg.norm(place) == pytest.approx(distance, rel=1e-12)
@@ -63,18 +63,19 @@ def test_field_angles_distances_and_azimuths_are_those_given():
 
 def test_the_rows_of_the_board_run_along_the_field_angle():
     path = FieldAngles(field_deg=(60.0,), azimuth_deg=(40.0,), extra_tilt_deg=0.0)
-    (pose,) = path.poses(TARGET)
+    pose = path.pose(0, TARGET)
     fields = [
         angle_deg(p, np.array([0, 0, 1.0])) for p in pose.apply(TARGET.board_centre + [[0, -250, 0], [0, 250, 0]])
     ]
     # Facing from 1500 mm, 250 mm are seen under atan(1/6), all of it as field angle.
     np.testing.assert_allclose(fields, 60.0 + np.degrees(np.arctan(1 / 6.0)) * np.array([1, -1]), atol=1e-9)
-    sideways = dataclasses.replace(path, roll_deg=90.0).poses(TARGET)[0]
+    sideways = dataclasses.replace(path, roll_deg=90.0).pose(0, TARGET)
     assert angle_deg(sideways.R[:, 0], pose.R[:, 1]) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_azimuths_can_be_counted():
-    assert FieldAngles(azimuth_deg=4).azimuths == (0.0, 90.0, 180.0, 270.0)
+    path = FieldAngles(azimuth_deg=4)
+    assert [path.azimuth(i) for i in range(path.count)] == [0.0, 90.0, 180.0, 270.0]
 
 
 def test_a_camera_is_not_planned_beyond_its_field():

@@ -123,7 +123,7 @@ def test_what_is_linear_in_colour_and_true_for_each_pixel(made):
 
     recipe, root = parse_recipe(made[0].read_text(), "recipe"), made[1]
     frame = plan(recipe)[0]
-    linear = read_linear(root / linear_path(frame), linear_key(recipe, frame))
+    linear = read_linear(root / linear_path(frame.frame_id), linear_key(recipe, frame))
     assert linear.background.shape == (120, 160, 3)
     assert linear.radiance.shape[:2] == (linear.region.height, linear.region.width)
     with OpenEXR.File(str(root / row_of(root)["truth"]), separate_channels=True) as file:
