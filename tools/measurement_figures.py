@@ -150,6 +150,23 @@ def compared_solvers(results: Results) -> str:
     return f"OPnP {opnp:.1f} ms, GPnPf {gpnpf:.2f} ms, PnPfr {pnpfr:.2f} ms; EPOSIT {eposit_us:.1f} µs"
 
 
+def single_poses(results: Results) -> str:
+    """One call at a time against SQPNP, batches against PoseLib's p3p and polish, and what the first call costs."""
+
+    def told(kind: str, other: str) -> list[str]:
+        return [span(results.cpu_ratios(name, kind, other), ".1f") for name in ("best", "eposit")]
+
+    single, batch = told("single call", "OpenCV SQPNP"), told("batch", "PoseLib p3p and polish")
+    (ransac,) = results.cpu_ratios("robust", "single call", "OpenCV")
+    (imported,), (first,) = results.figures("import eposit"), results.figures("first call of best")
+    return (
+        f"single calls {single[0]} times (`best`), {single[1]} times (`eposit`) as many as SQPNP; batches {batch[0]} "
+        f"and {batch[1]} times as many as p3p and polish; `robust`, half of 54 points wrong, {ransac:.0f} times as "
+        f"many as solvePnPRansac; import {imported['figure']} beyond NumPy, first call {first['figure']}, later "
+        f"{first['value']}"
+    )
+
+
 def confidence_regions(results: Results) -> str:
     """How often regions hold the truth."""
     rows = results.paper_rows("paper", "95 % region holds the truth")

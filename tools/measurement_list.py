@@ -172,6 +172,12 @@ MEASUREMENTS = (
         figures.compared_solvers,
     ),
     Measurement(
+        "single-poses",
+        "one pose a call and in batches on four kinds of object, against OpenCV and PoseLib, processor time; first use",
+        (bench("--only poses"),),
+        figures.single_poses,
+    ),
+    Measurement(
         "confidence-regions",
         "95 % regions of `solution.covariance`, 20 000 trials: share that holds the truth",
         (PAPER_BEYOND,),
