@@ -161,13 +161,13 @@ MEASUREMENTS = (
     ),
     Measurement(
         "solver",
-        "`solve` on four points in batches of 100 000 against PoseLib's p3p in a loop, poses per second, one thread",
+        "`solve` on four points in batches of 100 000 against PoseLib's p3p in a loop, poses per second (processor)",
         (SOLVER_BENCH,),
         figures.solver,
     ),
     Measurement(
         "compared-solvers",
-        "the compared solvers, a pose in a batch",
+        "the compared solvers, a pose in a batch, processor time",
         (SOLVER_BENCH,),
         figures.compared_solvers,
     ),

@@ -80,10 +80,6 @@ class Results:
         """The same in processor time, which other programs disturb less: rows whose names start and end so."""
         return [row["cpu_ratio"] for row in self._times(start, other, 0) if end in row["ours"]]
 
-    def ours_ms(self, start: str) -> float:
-        """Time of ours, ms, in the first of a benchmark's rows whose names start so."""
-        return self._times(start, "", 0)[0]["ours_ms"]
-
     def _times(self, start: str, other: str, command: int) -> list[dict[str, Any]]:
         rows = json.loads(self.outputs[command])["times"]
         return [row for row in rows if row["ours"].startswith(start) and row["other"].startswith(other)]
