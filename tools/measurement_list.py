@@ -161,15 +161,21 @@ MEASUREMENTS = (
     ),
     Measurement(
         "solver",
-        "`solve` on four points in batches of 100 000 against PoseLib's p3p in a loop, poses per second, one thread",
+        "`solve` on four points in batches of 100 000 against PoseLib's p3p in a loop, poses per second (processor)",
         (SOLVER_BENCH,),
         figures.solver,
     ),
     Measurement(
         "compared-solvers",
-        "the compared solvers, a pose in a batch",
+        "the compared solvers, a pose in a batch, processor time",
         (SOLVER_BENCH,),
         figures.compared_solvers,
+    ),
+    Measurement(
+        "single-poses",
+        "one pose a call and in batches on four kinds of object, against OpenCV and PoseLib, processor time; first use",
+        (bench("--only poses"),),
+        figures.single_poses,
     ),
     Measurement(
         "confidence-regions",

@@ -76,9 +76,9 @@ class Results:
         """
         return [row["ratio"] for row in self._times(start, other, command)]
 
-    def ours_ms(self, start: str) -> float:
-        """Time of ours, ms, in the first of a benchmark's rows whose names start so."""
-        return self._times(start, "", 0)[0]["ours_ms"]
+    def cpu_ratios(self, start: str, end: str, other: str) -> list[float]:
+        """The same in processor time, which other programs disturb less: rows whose names start and end so."""
+        return [row["cpu_ratio"] for row in self._times(start, other, 0) if end in row["ours"]]
 
     def _times(self, start: str, other: str, command: int) -> list[dict[str, Any]]:
         rows = json.loads(self.outputs[command])["times"]

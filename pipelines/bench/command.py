@@ -22,6 +22,7 @@ from pipelines.bench import (
     scaling,
     solvers,
 )
+from pipelines.bench.poses import measure as single_poses
 from pipelines.bench.table import Row
 
 Part = Callable[[Recipe, int], Iterator[Row]]
@@ -39,6 +40,7 @@ def parts() -> dict[str, Part]:
         "equal": equal_accuracy.measure,
         "detection": detection.measure,
         "solver": solvers.measure,
+        "poses": single_poses,
         "growth": scaling.measure,
         "blender": blender.measure,
     }

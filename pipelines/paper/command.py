@@ -30,6 +30,7 @@ MARKS = {Verdict.HOLDS: "better", Verdict.PARTLY: "partly", Verdict.FAILS: "wors
 def parts(out: Path, seeds: int, engine: Engine, tell: Callable[[str], None]) -> dict[str, Measure]:
     """The parts by name, in the order of the page."""
     from pipelines.paper.beyond import beyond
+    from pipelines.paper.derivation import derivation
     from pipelines.paper.experiment import measure as experiment
     from pipelines.paper.rendered import images, wide
     from pipelines.paper.simulation.fisheye import fisheye
@@ -44,6 +45,7 @@ def parts(out: Path, seeds: int, engine: Engine, tell: Callable[[str], None]) ->
         "pinhole": lambda: [pinhole(seeds)],
         "fisheye": lambda: [fisheye(seeds)],
         "sensitivity": lambda: [sensitivity(max(1, seeds // 4))],
+        "derivation": lambda: [derivation(seeds)],
         "beyond": beyond,
         "images": lambda: [images(out / "images", engine, tell)],
         "wide": lambda: [wide(out / "wide", engine, tell)],

@@ -47,7 +47,7 @@ TEXT = """# The solver on ten kinds of object
 tilt that the test names for each object. All columns but the first two are shares of {problems} problems.
 
 - Lost: no pose. Dearer than the truth: the reprojection error of the pose found is above that of the true pose, so that
-  the lowest minimum was missed. Both must be 0.
+  the lowest minimum was missed. Both are exactly 0, or the test fails.
 - Wrong minimum: another minimum is nearer to the truth than the pose, which has the lowest error. It must be
   `ambiguous` but for one in a hundred.
 - The 95 % region is that of the stated covariance in all six numbers, of the poses that are neither `ambiguous` nor

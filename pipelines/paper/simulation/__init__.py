@@ -99,9 +99,24 @@ equations_from_principal_point = functools.partial(equations, theta_centre=None)
 as_released_from_principal_point = functools.partial(as_released, theta_centre=None)
 
 
+def equations_at_centre(problem: Draws) -> Solution:
+    """EPOSIT by the paper's equations with the image centre as principal point everywhere."""
+    return eposit.solve(OBJECT, problem.pixels, problem.nominal, "eposit")
+
+
+def as_released_at_centre(problem: Draws) -> Solution:
+    """The released code's behaviour, likewise."""
+    return released.solve(OBJECT, problem.pixels, problem.nominal)
+
+
 def eposit_exact(problem: Draws) -> Solution:
     """EPOSIT by the paper's equations with the true camera."""
     return eposit.solve(OBJECT, problem.pixels, problem.camera, "eposit")
+
+
+def as_released_exact(problem: Draws) -> Solution:
+    """The released code's behaviour with the true camera."""
+    return released.solve(OBJECT, problem.pixels, problem.camera)
 
 
 def best(problem: Draws) -> Solution:
@@ -122,6 +137,16 @@ def with_gpnpf(problem: Draws) -> Solution:
 def with_pnpfr(problem: Draws) -> Solution:
     """PnPfr about the image centre, as in the paper, by its stated rule."""
     return pnpfr.solve(OBJECT, problem.pixels, problem.nominal)
+
+
+def with_gpnpf_at_principal_point(problem: Draws) -> Solution:
+    """GPnPf about the true principal point, which the paper's figures of EPOSIT have subtracted."""
+    return gpnpf.solve(OBJECT, problem.pixels, problem.paper)
+
+
+def with_pnpfr_at_principal_point(problem: Draws) -> Solution:
+    """PnPfr likewise."""
+    return pnpfr.solve(OBJECT, problem.pixels, problem.paper)
 
 
 def with_pnpfr_root(problem: Draws, which: str) -> Solution:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from eposit.arrays import Array
 from pipelines.pages.sections import Drawing, Table
 from pipelines.paper import simulation as sim
+from pipelines.paper.claims import EQUATIONS, RELEASED, Verdict
 from pipelines.paper.problems import NORMAL_MEDIAN, OBJECT, bounds, information
 from pipelines.paper.simulation.plots import boxes
 from pipelines.statistics import FEW, bootstrap, median, percent, percentile95, rate
@@ -27,9 +29,15 @@ SOLVERS: dict[str, sim.Estimate] = {
     "EPOSIT, equations": sim.equations,
     "EPOSIT, released": sim.as_released,
     "EPOSIT, true camera": sim.eposit_exact,
+    "EPOSIT, equations, image centre": sim.equations_at_centre,
+    "EPOSIT, released, image centre": sim.as_released_at_centre,
+    "EPOSIT, equations, principal point": sim.equations_from_principal_point,
+    "EPOSIT, released, principal point": sim.as_released_from_principal_point,
     "OPnP": sim.with_opnp,
     "GPnPf": sim.with_gpnpf,
     "PnPfr, least distortion": sim.with_pnpfr,
+    "GPnPf, principal point": sim.with_gpnpf_at_principal_point,
+    "PnPfr, principal point": sim.with_pnpfr_at_principal_point,
     "PnPfr, first root": partial(sim.with_pnpfr_root, which="first"),
     "PnPfr, best root": partial(sim.with_pnpfr_root, which="best"),
     "ours (best)": sim.best,
@@ -89,6 +97,47 @@ def _against_bound(lens: str, found: dict[str, sim.Outcome]) -> Table:
     )  # fmt: skip
 
 
+@dataclass(frozen=True, slots=True)
+class Alike:
+    """EPOSIT and the solvers that estimate the focal length, all with the same point as principal point."""
+
+    point: str  # in words
+    equations: sim.Outcome
+    released: sim.Outcome
+    others: dict[str, sim.Outcome]
+
+    @staticmethod
+    def both(found: dict[str, sim.Outcome]) -> tuple[Alike, Alike]:
+        """With the image centre, as a user without calibration has it, and with the true principal point."""
+        return Alike._about("image centre", "PnPfr, least distortion", found), Alike._about(
+            "principal point", "PnPfr, principal point", found
+        )
+
+    @staticmethod
+    def _about(point: str, pnpfr: str, found: dict[str, sim.Outcome]) -> Alike:
+        others = {"PnPfr": found[pnpfr]}
+        gpnpf = "GPnPf" if point == "image centre" else f"GPnPf, {point}"
+        if gpnpf in found:
+            others["GPnPf"] = found[gpnpf]
+        ours = (found[f"EPOSIT, {method}, {point}"] for method in (EQUATIONS, RELEASED))
+        return Alike(point, *ours, others)
+
+
+def told_alike(both: Iterable[Alike], method: str, told: Callable[[sim.Outcome], str]) -> str:
+    """The figures of EPOSIT by a method and of the others, for each of the two points."""
+    return "; ".join(
+        f"{alike.point}: EPOSIT {told(getattr(alike, method))}, "
+        + ", ".join(f"{name} {told(outcome)}" for name, outcome in alike.others.items())
+        for alike in both
+    )
+
+
+def judged_alike(both: Iterable[Alike], is_better: Callable[[sim.Outcome, sim.Outcome], bool]) -> Verdict:
+    """Whether EPOSIT is better than each of the others: with both points, with one, or with none."""
+    held = [all(is_better(alike.equations, other) for other in alike.others.values()) for alike in both]
+    return (Verdict.FAILS, Verdict.PARTLY, Verdict.HOLDS)[sum(held)]
+
+
 def _by_pose(values: Array) -> Array:
     """(poses, seeds), so that the draws of a pose stay together."""
     return values.T
@@ -99,6 +148,11 @@ def errors_text(outcome: sim.Outcome) -> str:
     rx, ry, rz = (median_of(outcome, k) for k in range(3))
     z = bootstrap(_by_pose(np.abs(outcome.error[..., 5])), median, resamples=FEW)
     return f"{rx:.3f}/{ry:.3f}/{rz:.3f} deg, z {z.text(3)} mm"
+
+
+def turn_text(outcome: sim.Outcome) -> str:
+    """Medians of the three angles."""
+    return "/".join(f"{median_of(outcome, k):.2f}" for k in range(3)) + " deg"
 
 
 def gross_failures_text(outcome: sim.Outcome) -> str:

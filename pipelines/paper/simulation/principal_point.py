@@ -29,6 +29,7 @@ from pipelines.paper.simulation.precision import METHODS
 FROM_CENTRE = {EQUATIONS: sim.equations, RELEASED: sim.as_released}
 PINHOLE = ("perspective",)
 ALL = slice(0, 6)
+TURN_DEG, SHIFT_MM = 0.3, 1.9  # the paper's bounds
 INTRO = "Theta measured from the image centre, (800, 600), against theta from the true principal point."
 
 
@@ -42,6 +43,14 @@ class Differences:
         """Magnitude of the largest mean of some components among lenses."""
         means = [np.abs(np.nanmean(self.values[method, lens], axis=(0, 1))) for lens in lenses]
         return float(max(mean[part].max() for mean in means))
+
+    def deviation(self, method: str, part: slice) -> float:
+        """Largest standard deviation of some components among lenses, over draws and poses."""
+        return float(max(np.nanstd(self.values[method, lens], axis=(0, 1))[part].max() for lens in sim.LENSES))
+
+    def farthest(self, method: str, part: slice) -> float:
+        """Largest magnitude of some components in any frame of any lens."""
+        return float(max(np.nanmax(np.abs(self.values[method, lens][..., part])) for lens in sim.LENSES))
 
 
 def principal_point(seeds: int) -> PaperSection:
@@ -58,7 +67,7 @@ def principal_point(seeds: int) -> PaperSection:
     items = (
         Drawing(
             "The paper's figure 5: differences, as released; dashed: its bounds of 0.3 degrees and 1.9 mm",
-            boxes(shown, {k: [-0.3, 0.3] if k < 3 else [-1.9, 1.9] for k in range(6)}),
+            boxes(shown, {k: [-TURN_DEG, TURN_DEG] if k < 3 else [-SHIFT_MM, SHIFT_MM] for k in range(6)}),
         ),
         Table("Mean differences, with 95 % intervals over the draws", sim.MEANS_HEAD, tuple(rows)),
     )
@@ -69,8 +78,21 @@ def _turn(found: Differences, method: str, lenses: tuple[str, ...] = sim.LENSES)
     return f"{found.largest(method, ROTATION, lenses):.2g} deg"
 
 
+def _deviation(found: Differences, method: str) -> str:
+    return f"{found.deviation(method, ROTATION):.2g} deg at most"
+
+
 def _shift(found: Differences, method: str) -> str:
-    return f"x, y {found.largest(method, PLACE):.2g} mm, z {found.largest(method, DEPTH):.2g} mm"
+    return (
+        f"largest x, y {found.farthest(method, PLACE):.2g} mm, z {found.farthest(method, DEPTH):.2g} mm; means "
+        f"{found.largest(method, PLACE):.2g} and {found.largest(method, DEPTH):.2g} mm"
+    )
+
+
+def _shift_verdict(found: Differences) -> Verdict:
+    if found.farthest(RELEASED, PLACE) >= SHIFT_MM:
+        return Verdict.FAILS
+    return Verdict.HOLDS if found.farthest(RELEASED, DEPTH) < SHIFT_MM else Verdict.PARTLY
 
 
 def _reach() -> tuple[float, float]:
@@ -105,15 +127,20 @@ STATEMENTS: tuple[Statement[Differences], ...] = (
     ),
     Statement(
         "III-B", "The largest mean difference of rotation is below 0.3 degrees", "0.3 deg", *by_both(_turn),
-        holds_if(lambda found: found.largest(RELEASED, ROTATION) < 0.3),
+        holds_if(lambda found: found.largest(RELEASED, ROTATION) < TURN_DEG),
         "A centre some twenty pixels off changes theta by two degrees, and G changes slowly with theta.",
         "principal-point",
     ),
     Statement(
-        "III-B", "The largest difference of translation is below 1.9 mm", "1.9 mm", *by_both(_shift),
-        holds_if(lambda found: found.largest(RELEASED, DEPTH) < 1.9, Verdict.PARTLY),
-        "It holds in x and y. In z the mean difference is larger, under the equations as under the released code.",
+        "III-B", "Their deviations are also small", "no number", *by_both(_deviation),
+        holds_if(lambda found: found.deviation(RELEASED, ROTATION) < TURN_DEG),
+        "Standard deviation over all poses and draws, the largest of lenses and axes, against the bound of the means.",
         "principal-point",
+    ),
+    Statement(
+        "III-B", "The largest difference of translation is below 1.9 mm", "1.9 mm", *by_both(_shift), _shift_verdict,
+        "The largest of all frames, as the paper says. It holds in x and y; in z already the mean difference of the "
+        "lens with the strongest distortion is larger, by the equations and as released.", "principal-point",
     ),
     Statement(
         "III-B", "1.9 mm is acceptable beside the smallest true value of 100 mm", "100 mm",

@@ -82,10 +82,12 @@ def test_a_picture_without_a_board_keeps_its_row(found, pictures):
 
 def test_the_section_has_every_picture_and_claim(found):
     some = Interval(1.0, 0.5, 2.0)
-    made = section({"points": found}, Cost(some, some, {"points": some}))
+    made = section({"points": found}, Cost(some, some, {"points": np.arange(30.0)}))
     tables = [item for item in made.items if isinstance(item, Table)]
     assert len(tables[0].rows) == 30
     assert all(len(row) == len(table.head) for table in tables for row in table.rows)
+    assert [row[2] for row in tables[0].rows] == [f"{i}" for i in range(30)]  # each detection has its time
+    assert [row[2] for row in tables[-1].rows] == ["0.1", "0.1", "7.6"]  # beside the paper's
     assert sum(isinstance(item, Drawing) for item in made.items) == 3
     assert len(made.claims) == 7
     assert all(claim.part == "experiment" and claim.why for claim in made.claims)

@@ -7,12 +7,14 @@ import pytest
 
 from pipelines.cli import app, guarded
 from pipelines.paper import simulation
-from pipelines.paper.claims import Claim, Verdict
+from pipelines.paper.claims import Claim, Verdict, judged
 from pipelines.paper.command import markdown, reproduce
+from pipelines.paper.derivation import advantages, choice, ratios
 from pipelines.paper.problems import OBJECT, bounds, information
+from pipelines.paper.simulation.comparison import Alike, judged_alike, median_of, told_alike
 from pipelines.paper.simulation.fisheye import fisheye
 from pipelines.paper.simulation.precision import METHODS, precision
-from pipelines.paper.simulation.principal_point import principal_point
+from pipelines.paper.simulation.principal_point import STATEMENTS, Differences, principal_point
 from pipelines.paper.simulation.sensitivity import sensitivity
 from tests.pipelines.pages.parsed import Page
 
@@ -64,6 +66,59 @@ def test_a_gross_failure_is_a_missing_pose_or_one_twice_as_far():
     assert np.isnan(found.error[0, 1]).all()
 
 
+def test_the_largest_difference_is_that_of_a_frame_and_not_a_mean():
+    values = np.zeros((2, 3, 6))
+    values[1, 2, 3], values[0, 1, 5] = -1.5, 4.0
+    lenses = {(method, lens): values for method in METHODS for lens in simulation.LENSES}
+    found = Differences(lenses)
+    assert found.farthest("released", simulation.PLACE) == 1.5
+    assert found.largest("released", simulation.PLACE) == pytest.approx(0.25)
+    by_text = {claim.text: claim for claim in judged(STATEMENTS, found)}
+    claim = by_text["The largest difference of translation is below 1.9 mm"]
+    assert claim.verdict == Verdict.PARTLY  # in x and y, not in z
+    assert "largest x, y 1.5 mm, z 4 mm; means 0.25 and 0.67 mm" in claim.equations
+
+
+def outcome_with(x_mm: float) -> simulation.Outcome:
+    error = np.zeros((1, 4, 6))
+    error[..., 3] = x_mm
+    nothing = np.zeros((1, 4), bool)
+    return simulation.Outcome(error, error[0], nothing, nothing)
+
+
+@pytest.mark.parametrize(
+    ("at_centre", "at_point", "verdict"),
+    [(3.0, 3.0, Verdict.HOLDS), (1.0, 3.0, Verdict.PARTLY), (1.0, 1.0, Verdict.FAILS)],
+)
+def test_solvers_are_judged_with_the_same_principal_point_both_ways(at_centre, at_point, verdict):
+    ours = {
+        f"EPOSIT, {method}, {point}": outcome_with(1.0)
+        for method in METHODS
+        for point in ("image centre", "principal point")
+    }
+    others = {"PnPfr, least distortion": outcome_with(at_centre), "PnPfr, principal point": outcome_with(at_point)}
+    both = Alike.both(ours | others)
+    assert judged_alike(both, lambda a, b: 1.25 * median_of(a, 3) < median_of(b, 3)) == verdict
+    told = told_alike(both, "equations", lambda outcome: f"{median_of(outcome, 3):g} mm")
+    assert told == (
+        f"image centre: EPOSIT 1 mm, PnPfr {at_centre:g} mm; principal point: EPOSIT 1 mm, PnPfr {at_point:g} mm"
+    )
+
+
+def test_printed_ratios_are_identities_and_an_altered_one_is_not(monkeypatch):
+    assert {claim.verdict for claim in ratios.measure()[1]} == {Verdict.HOLDS}
+    monkeypatch.setitem(ratios.PRINTED, "equisolid", (ratios.PRINTED["equisolid"][0], lambda a: np.cos(a / 2.0) ** 2))
+    assert {claim.verdict for claim in ratios.measure()[1]} == {Verdict.FAILS}
+
+
+def test_what_the_derivation_claims_is_measured():
+    (chosen,), told = choice.measure(1)[1], {claim.text.split(" ")[0]: claim for claim in advantages.measure(1)[1]}
+    assert chosen.verdict == Verdict.PARTLY  # there are several solutions, and all reproduce their points
+    assert told["Relative"].verdict == Verdict.PARTLY  # they suffice, for other methods, too
+    assert told["The"].verdict == Verdict.PARTLY  # rotation, but not depth
+    assert "z bias -4" in told["The"].equations  # 2.1 % of 2045 mm
+
+
 def test_every_part_on_points_has_claims_with_figures():
     sections = precision(2), principal_point(2), fisheye(1), sensitivity(1)
     claims = [claim for section in sections for claim in section.claims]
@@ -79,14 +134,14 @@ def test_the_files_are_written_and_the_table_keeps_its_columns(tmp_path, capsys)
     html = page.read_text()
     page_of_paper = Page(html)
     assert len(page_of_paper.of("svg")) == 1
-    assert re.fullmatch(r"Of 6 claims .*\.", page_of_paper.of("h1")[0].text)
+    assert re.fullmatch(r"Of 7 claims .*\.", page_of_paper.of("h1")[0].text)
     claims_table, *tables = page_of_paper.of("table")
-    assert len(page_of_paper.inside(claims_table, "tbody")) == 6
+    assert len(page_of_paper.inside(claims_table, "tbody")) == 7
     assert all(page_of_paper.inside(table, "caption") for table in tables)
     assert "Stability to the principal point" in html
     rows = [line for line in claims.read_text().splitlines() if line.startswith("|")]
     assert len({len(re.findall(r"(?<!\\)\|", row)) for row in rows}) == 1
-    assert len(rows) == 2 + 6
+    assert len(rows) == 2 + 7
 
 
 def test_bars_within_a_claim_are_escaped():
