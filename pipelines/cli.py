@@ -14,7 +14,7 @@ import typer.core
 import typer.main
 
 from datasets.errors import UserError
-from pipelines.commands import compare, nightly, stages, tools
+from pipelines.commands import compare, nightly, plan, stages, tools
 from pipelines.endings import UNFINISHED, USER_ERROR, UnfinishedError, say_unexpected
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)  # what a disk refuses
@@ -39,6 +39,7 @@ COMMANDS: tuple[tuple[Callable[..., None], str], ...] = (
     (tools.bench, "bench demo --only render --only solver --out bench.md"),
     (tools.paper, "paper --points-only --out out/paper"),
     (tools.target, "target charuco --out board.pdf"),
+    (plan.plan, "plan demo --frames 1e6 --workers 64"),
     (tools.recipes, "recipes"),
     (tools.describe, "describe demo"),
 )

@@ -23,7 +23,7 @@ def facts() -> list[tuple[str, str]]:
     return [
         ("python", platform.python_version()),
         *((name, version_of(name) or "not installed") for name in LIBRARIES),
-        ("processor", f"{_processor()}, {_system()}"),
+        ("processor", f"{processor()}, {_system()}"),
         ("date", datetime.date.today().isoformat()),
     ]
 
@@ -41,7 +41,7 @@ def provenance() -> Provenance:
         date=datetime.date.today().isoformat(),
         python=platform.python_version(),
         libraries=tuple((name, version_of(name) or "not installed") for name in LIBRARIES),
-        processor=f"{_processor()}, {platform.system()} {platform.machine()}",
+        processor=f"{processor()}, {platform.system()} {platform.machine()}",
         blas=blas(),
     )
 
@@ -90,7 +90,8 @@ def _system() -> str:
     return f"{platform.system()} {platform.machine()}, {usable_cores()} cores"
 
 
-def _processor() -> str:
+def processor() -> str:
+    """Name of this machine's processor."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:

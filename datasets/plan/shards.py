@@ -19,9 +19,14 @@ def shard_frames(recipe: Recipe) -> int:
     most are a thousand, or as many as have 400 million pixels (two hundred of two megapixels): that bounds what a
     worker holds in memory, some 0.3 GB, and what it loses when it is killed.
     """
+    return shard_size(recipe, frame_count(recipe)) if recipe.shard_frames is None else recipe.shard_frames
+
+
+def shard_size(recipe: Recipe, frames: int) -> int:
+    """As `shard_frames`, if the recipe had so many frames."""
     if recipe.shard_frames is not None:
         return recipe.shard_frames
-    wanted = max(LEAST_SHARD_FRAMES, -(-frame_count(recipe) // SHARDS))
+    wanted = max(LEAST_SHARD_FRAMES, -(-frames // SHARDS))
     return min(wanted, recipe.most_shard_frames or _most(recipe))
 
 

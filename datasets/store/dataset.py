@@ -9,6 +9,7 @@ frames that the plan has for it.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,8 +23,9 @@ from datasets.store.atomic import replace_atomically, write_text
 from datasets.store.card import card
 from datasets.store.digest import table_digest
 from datasets.store.keys import fault_of_keys, numbers_of, order_of
+from datasets.store.known_shards import entries_of
 from datasets.store.linear_images import are_kept
-from datasets.store.manifest import MANIFEST_FILE, manifest_text, shard_entry
+from datasets.store.manifest import MANIFEST_FILE, manifest_text
 from datasets.store.nulls import with_nulls
 from datasets.store.provenance import Provenance
 from datasets.store.refusals import RECIPE_FILE as RECIPE_FILE
@@ -166,7 +168,11 @@ class Dataset:
         return sorted(found, key=order_of)
 
     def read(self, table: str, columns: list[str] | None = None) -> pa.Table:
-        """All rows of a table in order.
+        """All rows of a table in order. Errors as `each_shard`."""
+        return pa.concat_tables(self.each_shard(table, columns)).replace_schema_metadata(None)
+
+    def each_shard(self, table: str, columns: list[str] | None = None) -> Iterator[pa.Table]:
+        """The rows of a table shard by shard, in order, so that one shard is held at a time.
 
         Raises:
             UserError: there are none, one is missing beside others, or one is damaged.
@@ -180,7 +186,8 @@ class Dataset:
             for path in (self.shard_path(table, index, int(count), variant) for index in range(int(count))):
                 if path not in there:
                     raise missing(path)
-        return pa.concat_tables(self.read_shard(path, columns) for path in paths).replace_schema_metadata(None)
+        for path in paths:
+            yield self.read_shard(path, columns)
 
     def write_manifest(self) -> None:
         """Manifest and dataset card, both derived from the shards and rebuilt at every stage's end.
@@ -188,7 +195,7 @@ class Dataset:
         Raises:
             UserError: a shard is damaged, or the disk or its permissions refuse.
         """
-        entries = [shard_entry(self.root, path) for table in TABLES for path in self.shards(table)]
+        entries = entries_of(self.root, [path for table in TABLES for path in self.shards(table)])
         text = manifest_text(self.root, self.recipe, entries, self.provenance)
         write_text(self.root / MANIFEST_FILE, text)
         frames = sum(entry["rows"] for entry in entries if entry["path"].startswith("frames/"))

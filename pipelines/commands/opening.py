@@ -9,8 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.console import Console
-
 from pipelines.endings import UnfinishedError, own_command
 
 if TYPE_CHECKING:
@@ -37,22 +35,15 @@ def load(recipe: str, regime: str | None) -> tuple[Recipe, str]:
 
 @contextmanager
 def begin(
-    recipe: str,
-    out: Path,
-    regime: str | None,
-    reuse: Path | None,
-    console: Console,
-    *,
-    shared: bool = False,
-    keep_masters: bool = True,
+    loaded: tuple[Recipe, str], out: Path, reuse: Path | None, execution: Execution, *, keep_masters: bool = True
 ) -> Iterator[Dataset]:
     """The dataset of a recipe, begun or resumed in `out`, with linear light from `reuse` where it fits.
 
-    Nobody else writes it while the body runs, but others that share it, with the same recipe. keep_masters: as for
-    `claim`.
+    Nobody else writes it while the body runs, but others that share it, with the same recipe. loaded: the recipe and
+    its text. keep_masters: as for `claim`.
 
     Raises:
-        UserError: a recipe, folder or plan that is not usable, or another process writes the folder.
+        UserError: a folder or plan that is not usable, or another process writes the folder.
     """
     from datasets.plan import plan
     from datasets.store.claim import claim
@@ -60,11 +51,12 @@ def begin(
     from datasets.store.reuse import reuse_linear_images, source_of
     from pipelines.machine import provenance
 
-    loaded, text = load(recipe, regime)
-    plan(loaded)
+    recipe, text = loaded
+    console, shared = execution.console, not execution.part.is_whole
+    plan(recipe)
     if reuse is not None:
         source_of(reuse)  # before anything is written
-    with claim(out, loaded, text, shared=shared, provenance=provenance(), keep_masters=keep_masters) as dataset:
+    with claim(out, recipe, text, shared=shared, provenance=provenance(), keep_masters=keep_masters) as dataset:
         if keep_masters and not are_kept(out):
             console.print("linear images are not kept, as this dataset was begun with --no-masters")
         if reuse is not None:

@@ -46,6 +46,17 @@ NoMasters = Annotated[
     typer.Option("--no-masters", help="Do not keep linear light, nine tenths of the bytes: nothing to reuse."),
 ]
 
+Frames = Annotated[
+    str | None, typer.Option("--frames", metavar="N", help="As if the recipe had N frames, as 1e9. [default: its own]")
+]
+Measure = Annotated[
+    bool,
+    typer.Option("--measure", help="Make sixteen frames first, in a temporary folder, and keep what they took."),
+]
+IgnoreDisk = Annotated[
+    bool, typer.Option("--ignore-disk", help="Begin even where the disk looks too small for what is still to be made.")
+]
+
 DetectorName = Annotated[str, typer.Option("--detector", help="edge-fit (ours), opencv-subpix or opencv-sb.")]
 OWN = "or your own as package.module:function."
 SOLVERS_HELP = (

@@ -10,7 +10,7 @@ from rich.console import Console
 
 from datasets.errors import UserError
 from pipelines.commands import options as o
-from pipelines.commands.opening import begin, complete_manifest, finish, opened, writing
+from pipelines.commands.opening import begin, complete_manifest, finish, load, opened, writing
 from pipelines.engines.choice import engine_of
 from pipelines.stages.part import part_of
 
@@ -27,6 +27,7 @@ def run(
     regime: o.Regime = None,
     reuse: o.Reuse = None,
     no_masters: o.NoMasters = False,
+    ignore_disk: o.IgnoreDisk = False,
     solver: o.MoreSolvers = None,
     estimator: o.MoreEstimators = None,
     timeout: o.Timeout = 300.0,
@@ -37,6 +38,7 @@ def run(
     quiet: o.Quiet = False,
 ) -> None:
     """Every stage: generate, detect, estimate, score, report; with --estimator photometric the pixels' bound, too."""
+    from pipelines.cost.before import ALL_STAGES, Start, tell_cost
     from pipelines.stages import run as stages
     from pipelines.stages.estimate import solver_of
     from pipelines.stages.estimate_images import OWN_SYSTEMS, estimator_of
@@ -49,8 +51,9 @@ def run(
         solver_of(name, limit_s=timeout)  # what cannot be called is told before anything is rendered
     for name in systems:
         estimator_of(name, timeout)
-    shared, console = not execution.part.is_whole, execution.console
-    with begin(recipe, out, regime, reuse, console, shared=shared, keep_masters=not no_masters) as dataset:
+    loaded = load(recipe, regime)
+    tell_cost(loaded[0], out, execution, Start(workers, ALL_STAGES, not no_masters, ignore_disk))
+    with begin(loaded, out, reuse, execution, keep_masters=not no_masters) as dataset:
         with compiled_ahead(dataset, execution.part) as kernels:  # beside the first pictures
             stages.run_generate(dataset, execution)
             stages.run_detect(dataset, execution, kernels=kernels)
@@ -68,7 +71,7 @@ def run(
             told = (
                 f"part {part.number} of {part.count} is done; after the last one, `report {out}` completes the dataset"
             )
-            console.print(told, soft_wrap=True)
+            execution.console.print(told, soft_wrap=True)
 
 
 def demo(
@@ -91,6 +94,7 @@ def generate(
     regime: o.Regime = None,
     reuse: o.Reuse = None,
     no_masters: o.NoMasters = False,
+    ignore_disk: o.IgnoreDisk = False,
     workers: o.Workers = 1,
     engine: o.EngineName = "local",
     ray_address: o.RayAddress = None,
@@ -98,11 +102,13 @@ def generate(
     quiet: o.Quiet = False,
 ) -> None:
     """Render images with their truth."""
+    from pipelines.cost.before import Start, tell_cost
     from pipelines.stages import run as stages
 
     execution = _execution(engine, workers, ray_address, shard, quiet)
-    shared, console = not execution.part.is_whole, execution.console
-    with begin(recipe, out, regime, reuse, console, shared=shared, keep_masters=not no_masters) as dataset:
+    loaded = load(recipe, regime)
+    tell_cost(loaded[0], out, execution, Start(workers, ("generate",), not no_masters, ignore_disk))
+    with begin(loaded, out, reuse, execution, keep_masters=not no_masters) as dataset:
         stages.run_generate(dataset, execution)
         finish(execution)
 

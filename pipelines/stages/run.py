@@ -110,7 +110,8 @@ def run_score(dataset: Dataset, execution: Execution) -> None:
     indices = _indices(dataset, execution)
     shards = score.targets(dataset, indices)
     if not execution.failures and (execution.part.is_whole or (indices and not shards)):
-        dataset.read("estimates", ["frame_id"])
+        for _ in dataset.each_shard("estimates", ["frame_id"]):
+            pass  # which refuses estimates that are not whole
     run_missing(Stage("score", score.is_done, score.run_shard), dataset, shards, execution)
 
 
@@ -141,8 +142,10 @@ def _run_answers(
 
 
 def _tell_failures(name: str, dataset: Dataset, paths: Sequence[Path], notes: Sequence[str]) -> None:
-    status = [text for path in paths for text in dataset.read_shard(path, ["status"])["status"].to_pylist()]
-    failed = status.count(Status.SOLVER_ERROR)
+    failed = rows = 0
+    for path in paths:
+        status = dataset.read_shard(path, ["status"])["status"].to_pylist()
+        failed, rows = failed + status.count(Status.SOLVER_ERROR), rows + len(status)
     if failed:
         first = f"; {notes[0]}" if notes else ""
-        print(f"{name}: {failed} of {len(status)} rows have the status solver_error{first}", file=sys.stderr)
+        print(f"{name}: {failed} of {rows} rows have the status solver_error{first}", file=sys.stderr)
