@@ -7,10 +7,38 @@ NumPy takes in the first axes, problems are first inside, too: `opnp` and the re
 """
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.floating]
 Mask = NDArray[np.bool_]
+
+
+def as_numbers(values: ArrayLike, name: str) -> Array:
+    """As a contiguous array of float64; NaN where a masked array is masked. name: of the argument, for the message.
+
+    Raises:
+        ValueError: what is no array of real numbers: texts, times, complex numbers, rows of different lengths.
+    """
+    if type(values) is np.ndarray and values.dtype == np.float64:
+        return values if values.flags.c_contiguous else values.copy()
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind not in "fiubO":
+            raise TypeError
+        with np.errstate(over="ignore"):
+            numbers = np.asarray(array, dtype=np.float64, order="C")
+    except (TypeError, ValueError, OverflowError):
+        what = f"an array of {values.dtype}" if isinstance(values, np.ndarray) else f"a {type(values).__name__}"
+        raise ValueError(f"{name} is {what} that has other things than real numbers; give an array of these") from None
+    if isinstance(values, np.ma.MaskedArray):
+        return np.where(np.ma.getmaskarray(values), np.nan, numbers)
+    return numbers
+
+
+def shown(value: object) -> str:
+    """A wrong argument for a message, which is to stay a sentence."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 60 else f"{text[:50]} ... ({type(value).__name__})"
 
 
 def cross(a: Array, b: Array) -> Array:

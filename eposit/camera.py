@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
+import numbers
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from eposit.arrays import Array, Mask
+from eposit.arrays import Array, Mask, as_numbers, shown
 from eposit.lens import get_lens
 from eposit.lens_law import Lens
+
+MOST = 1e150  # of a camera's numbers: their squares are numbers
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,14 +35,18 @@ class Camera:
     coefficients: tuple[float, ...] = ()  # in the order of eposit.COEFFICIENTS, in any shape; none for the paper's
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "coefficients", tuple(float(k) for k in np.ravel(self.coefficients)))
+        coefficients = as_numbers(self.coefficients, "camera coefficients").ravel().tolist()
+        object.__setattr__(self, "coefficients", tuple(coefficients))
+        if not isinstance(self.lens, str):
+            raise ValueError(f"camera lens is a {type(self.lens).__name__}; it must be one of eposit.LENS_NAMES")
         for name in ("fx", "fy", "width", "height"):
             value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
-                raise ValueError(f"camera {name} is {value}; it must be a positive number of pixels")
+            if not (_is_real(value) and math.isfinite(value) and value > 0):
+                raise ValueError(f"camera {name} is {shown(value)}; it must be a positive number of pixels")
         for name in ("cx", "cy"):
-            if not np.isfinite(getattr(self, name)):
-                raise ValueError(f"camera {name} is {getattr(self, name)}; it must be a finite number of pixels")
+            value = getattr(self, name)
+            if not (_is_real(value) and math.isfinite(value)):
+                raise ValueError(f"camera {name} is {shown(value)}; it must be a finite number of pixels")
         get_lens(self.lens, self.coefficients)
 
     @property
@@ -94,13 +102,18 @@ class Camera:
         return (u >= -0.5) & (u <= self.width - 0.5) & (v >= -0.5) & (v <= self.height - 0.5)
 
 
+def _is_real(value: object) -> bool:
+    """Whether a value is one real number, of whatever package, that float64 can hold."""
+    return isinstance(value, numbers.Real) and abs(value) <= MOST
+
+
 def _seen_angle(side: Array, z: Array) -> Array:
     """Incidence angle, rad; NaN for the camera centre and on the backward axis, where no direction is defined."""
     return np.where((side == 0.0) & (z <= 0.0), np.nan, np.arctan2(side, z))
 
 
 def _last_axis(values: ArrayLike, size: int, name: str) -> Array:
-    array = np.asarray(values, dtype=np.float64)
+    array = as_numbers(values, name)
     if array.ndim == 0 or array.shape[-1] != size:
         raise ValueError(f"{name} has shape {array.shape}; its last axis must have length {size}")
     return array

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eposit.arrays import Array, Mask
+from eposit.arrays import Array, Mask, as_numbers
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -26,7 +26,8 @@ class Pose:
 
     def apply(self, points: ArrayLike) -> Array:
         """(..., n, 3) points in the source frame to (..., n, 3) in the target frame."""
-        return np.asarray(points, dtype=np.float64) @ np.swapaxes(self.R, -1, -2) + self.t[..., None, :]
+        with np.errstate(all="ignore"):
+            return as_numbers(points, "points") @ np.swapaxes(self.R, -1, -2) + self.t[..., None, :]
 
     def inverse(self) -> Pose:
         """source_from_target."""

@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eposit.arrays import Array, Mask
+from eposit.arrays import Array, Mask, as_numbers
 from eposit.camera import Camera
 from eposit.compiled import layout
-from eposit.refine.weights import whitening
+from eposit.refine.weights import LEAST_SIGMA, MOST_SIGMA, whitening
 from eposit.solution import OK, STATUSES, Status
 
 
@@ -43,11 +43,15 @@ class Problem:
         return self.points_px[..., 0].T, self.points_px[..., 1].T
 
 
-def _numbers(values: ArrayLike) -> Array:
-    """As a contiguous array; NaN where a masked array is masked."""
-    if isinstance(values, np.ma.MaskedArray):
-        values = np.ma.filled(np.ma.asarray(values, dtype=np.float64), np.nan)
-    return np.ascontiguousarray(values, dtype=np.float64)
+def as_camera(camera: object) -> Camera:
+    """A camera as it is.
+
+    Raises:
+        ValueError: it is another thing.
+    """
+    if not isinstance(camera, Camera):
+        raise ValueError(f"camera is a {type(camera).__name__}; it must be an eposit.Camera")
+    return camera
 
 
 def as_object(points_in_obj: ArrayLike) -> Array:
@@ -56,7 +60,7 @@ def as_object(points_in_obj: ArrayLike) -> Array:
     Raises:
         ValueError: another shape, fewer than four points, or non-finite ones.
     """
-    obj = _numbers(points_in_obj)
+    obj = as_numbers(points_in_obj, "points_in_obj")
     if obj.ndim != 2 or obj.shape[1] != 3:
         raise ValueError(f"points_in_obj has shape {obj.shape}; it must be (n, 3)")
     if len(obj) < 4:
@@ -72,7 +76,7 @@ def as_pixels(points_px: ArrayLike, n: int) -> tuple[Array, bool]:
     Raises:
         ValueError: another shape.
     """
-    pixels = _numbers(points_px)
+    pixels = as_numbers(points_px, "points_px")
     if pixels.ndim not in (2, 3) or pixels.shape[-2:] != (n, 2):
         raise ValueError(f"points_px has shape {pixels.shape}; it must be ({n}, 2) or (b, {n}, 2)")
     return (pixels[None], True) if pixels.ndim == 2 else (pixels, False)
@@ -88,7 +92,7 @@ def as_bearings(rays: ArrayLike, points_px: ArrayLike | None, camera: Camera | N
     """
     if points_px is not None or camera is not None:
         raise ValueError("solve was given rays and points_px or a camera; give either rays, or points_px and camera")
-    vectors = _numbers(rays)
+    vectors = as_numbers(rays, "rays")
     if vectors.ndim not in (2, 3) or vectors.shape[-2:] != (n, 3):
         raise ValueError(f"rays has shape {vectors.shape}; it must be ({n}, 3) or (b, {n}, 3)")
     return BEARINGS.project(vectors), BEARINGS
@@ -108,9 +112,9 @@ def as_weights(sigma_px: ArrayLike | None, n: int) -> tuple[Array, float]:
     """
     if sigma_px is None:
         return EQUAL_WEIGHTS, 0.0
-    if isinstance(sigma_px, float | int) and 0.0 < sigma_px < np.inf:
+    if isinstance(sigma_px, float | int) and LEAST_SIGMA < sigma_px < MOST_SIGMA:
         return EQUAL_WEIGHTS, float(sigma_px) ** 2
-    sigma = np.asarray(sigma_px, dtype=np.float64)
+    sigma = as_numbers(sigma_px, "sigma_px")
     factor = whitening(sigma, n)
     if sigma.ndim == 0:
         return EQUAL_WEIGHTS, float(sigma) ** 2
@@ -161,7 +165,8 @@ def validate(
     """The problem, and whether it was given as a single image.
 
     Raises:
-        ValueError: wrong shapes, fewer than four points, non-finite object points, or an unusable sigma.
+        ValueError: wrong shapes, fewer than four points, non-finite object points, an unusable sigma, or a camera that
+            is none.
     """
     obj = as_object(points_in_obj)
     pixels, single = as_pixels(points_px, len(obj))
@@ -170,8 +175,8 @@ def validate(
         lost = ~np.all(np.isfinite(pixels), axis=(1, 2))
         mark(status, lost, Status.NON_FINITE)
         pixels = np.where(lost[:, None, None], 0.0, pixels)
-    weights = whitening(None if sigma_px is None else np.asarray(sigma_px, dtype=np.float64), len(obj))
-    return Problem(obj, pixels, camera, status, weights, sigma_px is not None), single
+    weights = whitening(None if sigma_px is None else as_numbers(sigma_px, "sigma_px"), len(obj))
+    return Problem(obj, pixels, as_camera(camera), status, weights, sigma_px is not None), single
 
 
 def mark(status: NDArray[np.int8], failed: Mask, reason: Status) -> None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from eposit.arrays import Array, Mask
+from eposit.arrays import Array, Mask, as_numbers, shown
 from eposit.camera import Camera
 from eposit.compiled.layout import LINEAR_RESULT, RESULT
-from eposit.problem import as_bearings, as_object, as_pixels, as_weights, workspace
+from eposit.problem import as_bearings, as_camera, as_object, as_pixels, as_weights, workspace
 from eposit.results import solve_batch, solve_one
 from eposit.robust import solve_robust
 from eposit.solution import Solution
@@ -16,6 +16,7 @@ from eposit.solution import Solution
 METHODS = ("best", "centred", "eposit", "posit")
 LINEAR = {"posit": 0, "eposit": 1, "centred": 2}
 DECISIVE = 2.0 * np.log(100.0)  # -2 log of the likelihood ratio of two minima from which the data decide: 100 to 1
+MOST_ITERATIONS = 1_000_000  # a call cannot be interrupted
 BENT = np.log(1.5)  # |log| of cost over parabola at three standard deviations from which the covariance is unreliable
 
 
@@ -62,21 +63,19 @@ def solve(
         1.5 of the parabola. The other methods do not weigh their points and state none: NaN.
     Raises:
         ValueError: wrong shapes, fewer than four points (eight with `robust`), non-finite object points, an unknown
-            method or sigma.
+            method or sigma, or an argument of a type that it cannot have.
     Source:
         Kang et al., EPOSIT. Centring is ours: with exact theta EPOSIT is POSIT on rectified points, and rays may be
         rectified about M0's ray as well as about the optical axis, which lifts the limit of 54.7 degrees.
     """
-    if method not in METHODS:
-        raise ValueError(f"unknown method {method!r}; known methods are {', '.join(METHODS)}")
-    if theta_centre is not None and method != "eposit":
-        raise ValueError(f"theta_centre goes with method 'eposit', not {method!r}; leave it out")
+    _check(method, refine, robust, tol, max_iterations, theta_centre)
     obj = as_object(points_in_obj)
     if rays is not None:
         points_px, camera = as_bearings(rays, points_px, camera, len(obj))
     if camera is None or points_px is None:
         raise ValueError("solve was given no image points; give points_px and camera, or rays")
     pixels, single = as_pixels(points_px, len(obj))
+    camera = as_camera(camera)
     weights, variance = as_weights(sigma_px, len(obj))
     if robust:
 
@@ -93,6 +92,34 @@ def solve(
     if method == "best":
         return _best(obj, pixels, camera, weights, variance, refine, single)
     return _linear(obj, pixels, camera, LINEAR[method], tol, max_iterations, theta_centre, single)
+
+
+def _check(
+    method: object, refine: object, robust: object, tol: object, max_iterations: object, theta_centre: object
+) -> None:
+    """Refuse options that no solver can take.
+
+    Raises:
+        ValueError: with the option and what it may be.
+    """
+    if not isinstance(method, str) or method not in METHODS:
+        raise ValueError(f"unknown method {shown(method)}; known methods are {', '.join(METHODS)}")
+    for name, value in (("refine", refine), ("robust", robust)):
+        if not isinstance(value, bool | np.bool_):
+            raise ValueError(f"{name} is a {type(value).__name__}; it must be True or False")
+    if not (isinstance(tol, float | int | np.number) and 0.0 <= tol < np.inf):
+        raise ValueError(f"tol is {shown(tol)}; it must be a number from 0")
+    if not (isinstance(max_iterations, int | np.integer) and 1 <= max_iterations <= MOST_ITERATIONS):
+        raise ValueError(
+            f"max_iterations is {shown(max_iterations)}; it must be a whole number from 1 to {MOST_ITERATIONS}"
+        )
+    if theta_centre is None:
+        return
+    if method != "eposit":
+        raise ValueError(f"theta_centre goes with method 'eposit', not {shown(method)}; leave it out")
+    centre = as_numbers(theta_centre, "theta_centre")
+    if centre.shape != (2,) or not np.all(np.isfinite(centre)):
+        raise ValueError(f"theta_centre is {shown(theta_centre)}; it must be two finite numbers, px")
 
 
 def _best(

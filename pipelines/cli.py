@@ -15,7 +15,7 @@ import typer.main
 
 from datasets.errors import UserError
 from pipelines.commands import compare, nightly, plan, stages, tools
-from pipelines.endings import UNFINISHED, USER_ERROR, UnfinishedError, say_unexpected
+from pipelines.endings import UNFINISHED, USER_ERROR, UnfinishedError, printable, say_unexpected
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)  # what a disk refuses
 EXAMPLE = "Example: python -m pipelines {}"
@@ -99,13 +99,13 @@ def guarded(command: Callable[[], Any]) -> int:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except UnfinishedError as error:
-        print(f"error: {error}", file=sys.stderr)
+        print(f"error: {printable(str(error))}", file=sys.stderr)
         return UNFINISHED
     except Exception as error:
         told = _told(error)
         if told is None:
             return say_unexpected(error)
-        print(f"error: {told}", file=sys.stderr)
+        print(f"error: {printable(told)}", file=sys.stderr)
         return USER_ERROR
     return 0
 

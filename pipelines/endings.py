@@ -18,6 +18,7 @@ UNEXPECTED = 70  # EX_SOFTWARE of sysexits.h
 UNFINISHED = 75  # EX_TEMPFAIL: the same command may succeed
 BY_SIGNAL = 128  # plus the signal's number, as a shell tells it
 SIGNALS = tuple(name for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+LONGEST_LINE = 2000  # letters of a line of an error
 PATIENCE_S = 5.0  # for what a signal finds at work: native code does not listen
 
 
@@ -36,6 +37,23 @@ class Stopped(BaseException):
 def own_command() -> str:
     """The command line of this process, as a shell takes it."""
     return f"python -m pipelines {shlex.join(sys.argv[1:])}".rstrip()
+
+
+def printable(text: str) -> str:
+    """A text for a terminal: what would steer it is escaped, and of long lines the middle is left out.
+
+    A sentence repeats names and values of files that may be of strangers.
+    """
+    lines = (
+        "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in _short(line))
+        for line in text.split("\n")
+    )
+    return "\n".join(lines)
+
+
+def _short(line: str) -> str:
+    half = LONGEST_LINE // 2
+    return line if len(line) <= LONGEST_LINE else f"{line[:half]} ... {line[-half:]}"
 
 
 def listen() -> None:
@@ -78,7 +96,7 @@ def _leave_late(number: int) -> None:
 
 def say_unexpected(error: BaseException) -> int:
     """Tell in one sentence of an error that nobody expected, with its traceback in a file; the exit code."""
-    what = " ".join(f"{type(error).__name__}: {error}".split())[:300]
+    what = printable(" ".join(f"{type(error).__name__}: {error}".split())[:300])
     try:
         descriptor, name = tempfile.mkstemp(prefix="pipelines-", suffix=".log")
         with os.fdopen(descriptor, "w", encoding="utf-8", errors="backslashreplace") as file:

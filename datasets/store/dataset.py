@@ -22,11 +22,12 @@ from datasets.schema import FRAME_ID, READABLE, SCHEMA_VERSION, TABLES
 from datasets.store.atomic import replace_atomically, write_text
 from datasets.store.card import card
 from datasets.store.digest import table_digest
-from datasets.store.keys import fault_of_keys, numbers_of, order_of
+from datasets.store.keys import fault_of_keys, numbers_of, order_of, rows_of
 from datasets.store.known_shards import entries_of
 from datasets.store.linear_images import are_kept
 from datasets.store.manifest import MANIFEST_FILE, manifest_text
 from datasets.store.nulls import with_nulls
+from datasets.store.planned_rows import fault_of_truth
 from datasets.store.provenance import Provenance
 from datasets.store.refusals import RECIPE_FILE as RECIPE_FILE
 from datasets.store.refusals import SHARD_NAME, damaged, foreign, missing, refused, stage_of, unreadable, unsupported
@@ -43,6 +44,7 @@ from datasets.store.shard_file import (
     version_of,
     write_rows,
 )  # fmt: skip
+from datasets.store.values import fault_of_values
 from datasets.store.versions import as_begun, upgraded, with_later_columns
 
 CARD_FILE = "README.md"
@@ -130,7 +132,11 @@ class Dataset:
         wanted = columns or TABLES[name].names
         rows = self.stored_rows(path, list(dict.fromkeys([FRAME_ID, *wanted])))
         if self.check:
-            fault = fault_of_keys(self.recipe, path, rows)
+            fault = (
+                fault_of_values(name, rows)
+                or fault_of_keys(self.recipe, path, rows)
+                or fault_of_truth(self.recipe, name, self.index_of(path), rows)
+            )
             if fault:
                 raise damaged(path, fault)
         if version_of(rows.schema.metadata) != SCHEMA_VERSION:
@@ -144,7 +150,7 @@ class Dataset:
             UserError: as `read_shard`, but for the plan's frames.
         """
         try:
-            rows = read_rows(path, columns, check=self.check)
+            rows = read_rows(path, columns, check=self.check, most_rows=rows_of(self.recipe, path))
         except FileNotFoundError:
             raise missing(path) from None
         except PermissionError:

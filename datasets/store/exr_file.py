@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import errno
 import hashlib
-import io
 import json
 import os
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, redirect_stdout
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +15,7 @@ from numpy.typing import NDArray
 
 from datasets.recipe.cameras import MAX_PIXELS
 from datasets.store.atomic import replace_atomically
+from datasets.store.silence import silent_library
 
 DIGEST = "digest"  # in the header; files of earlier versions have none
 STATED = ("dataWindow", "displayWindow", "key", "region", "background", "objects", "circle")  # what we read of a header
@@ -92,20 +91,6 @@ def read_exr(path: Path, *, check: bool = True) -> tuple[Header, dict[str, NDArr
     if check and DIGEST in header and header[DIGEST] != _digest(header, channels):
         raise DamagedExrError("its values are not those that were written")
     return header, channels
-
-
-@contextmanager
-def silent_library() -> Iterator[None]:
-    """Nothing is printed: OpenEXR's library writes what it raises to descriptor 2, its Python binding to sys.stdout."""
-    kept = os.dup(2)
-    try:
-        with open(os.devnull, "wb") as nowhere:
-            os.dup2(nowhere.fileno(), 2)
-        with redirect_stdout(io.StringIO()):
-            yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)
 
 
 def _digest(header: Header, channels: Channels) -> str:

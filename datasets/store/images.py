@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datasets.recipe.cameras import MAX_PIXELS
+from datasets.store.silence import silent_library
 
 PNG_START = b"\x89PNG\r\n\x1a\n"
+NO_PNG = "the image is not an 8-bit PNG, grey or in colour"
 PNG_HEADER_BYTES = 24  # up to width and height
 
 
@@ -33,20 +35,30 @@ def decode_pixels(data: bytes) -> NDArray[np.uint8]:
     Raises:
         ValueError: not an 8-bit image, grey or in colour.
     """
-    if not _is_small_enough(data):
+    size = png_size(data)
+    if size is None:
+        raise ValueError(NO_PNG)
+    if size[0] * size[1] > MAX_PIXELS:  # nothing is allocated for a picture that claims more
         raise ValueError(f"the image is no PNG of at most {MAX_PIXELS} pixels")
-    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
+    try:
+        with silent_library():
+            image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    except cv2.error:
+        image = None
     if image is None or image.dtype != np.uint8 or not (image.ndim == 2 or image.shape[2:] == (3,)):
-        raise ValueError("the image is not an 8-bit PNG, grey or in colour")
+        raise ValueError(NO_PNG)
     return (image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2RGB)).astype(np.uint8, copy=False)
 
 
-def _is_small_enough(data: bytes) -> bool:
-    """Whether the header of a PNG claims what can be decoded: nothing is allocated for one that claims more."""
-    if not data.startswith(PNG_START) or len(data) < PNG_HEADER_BYTES:
-        return not data.startswith(PNG_START)  # OpenCV says what is wrong with another file
+def png_size(data: bytes) -> tuple[int, int] | None:
+    """Height and width that the header of a PNG claims; None of what is no PNG.
+
+    OpenCV would decode many other formats, whose headers nobody has looked at.
+    """
+    if not isinstance(data, bytes) or not data.startswith(PNG_START) or len(data) < PNG_HEADER_BYTES:
+        return None
     width, height = struct.unpack(">II", data[16:PNG_HEADER_BYTES])
-    return width * height <= MAX_PIXELS
+    return height, width
 
 
 def decode_png(data: bytes) -> NDArray[np.uint8]:

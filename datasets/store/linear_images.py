@@ -10,6 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from datasets.errors import UserError
 from datasets.plan import Frame, plan
@@ -24,6 +25,7 @@ from render.optics import Optics
 from render.targets.image_region import Region
 
 MASTERS = "masters"  # their folder
+MOST_RADIANCE = 1e12  # of the light that a white board sends back in full: the sun's disc has some 1e5
 NOT_KEPT = "masters-not-kept.txt"  # lies in the folder of a dataset that does not keep them
 NOT_KEPT_TEXT = """\
 This dataset was made with --no-masters: its linear images are rendered, developed and not kept.
@@ -75,15 +77,30 @@ def read_linear(path: Path, key: str = "", *, check: bool = True) -> LinearImage
             )
         header, channels = read_exr(path, check=check)
         stored = np.asarray(channels["Y" if "Y" in channels else "RGB"], np.float32)
+        region = _region(header["dataWindow" if "background" in header else "region"])
+        whole, background = _region(header["displayWindow"]), float(header.get("background", 0.0))
+        fault = _fault(stored, region, whole, background)
+        if fault:
+            raise DamagedExrError(fault)
         if "background" in header:
-            return LinearImage(stored, _region(header["dataWindow"]), float(header["background"]))
-        region = _region(header["region"])
+            return LinearImage(stored, region, background)
         return LinearImage(stored[region.pixels], region, stored)
     except LinearImageError:
         raise
     except (ValueError, LookupError, TypeError, OSError) as error:
         what = str(error) if isinstance(error, DamagedExrError) else "it cannot be read"
         raise LinearImageError(f"{path} is damaged: {what}; `repair {path.parent.parent}` renders it again") from error
+
+
+def _fault(stored: NDArray[np.float32], region: Region, whole: Region, background: float) -> str | None:
+    """What in a linear image cannot be, whoever wrote it; None if nothing."""
+    inside = region.x >= 0 and region.y >= 0 and region.width > 0 and region.height > 0
+    inside = inside and region.x + region.width <= whole.width and region.y + region.height <= whole.height
+    if whole[:2] != (0, 0) or not inside:
+        return "its region lies outside the picture"
+    if not (np.all(np.abs(stored) < MOST_RADIANCE) and abs(background) < MOST_RADIANCE):
+        return "it has values that no light has"
+    return None
 
 
 def _whole(camera: Camera) -> Region:

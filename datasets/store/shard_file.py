@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from datasets.schema import KEYS, LATER_COLUMNS, NAN_VERSION, READABLE, SCORES_ADDED, TABLES, meanings
@@ -26,6 +27,12 @@ PLACE_KEY = b"place"  # table and name of the file, so that a shard under anothe
 CHECKS_KEY = b"checks"  # a digest of each column in their order, then one of the other keys and values
 MEANINGS_KEY = "meanings"  # column name to meaning, JSON
 HUGGINGFACE_KEY = "huggingface"  # which columns are images, as Hugging Face's `datasets` reads it
+SMALL_ROWS, SMALL_BYTES = 100_000, 64_000_000  # that any file may have
+MOST_EXPANSION = 20  # bytes of columns that one byte of a file may hold; pictures cannot be packed
+MOST_TEXT_BYTES = 4000
+MOST_REPEATED = 10**9  # bytes of pictures that are stored once for several rows
+# Others, as DELTA_BYTE_ARRAY, hold far more than their size.
+ENCODINGS = frozenset({"PLAIN", "RLE", "BIT_PACKED", "RLE_DICTIONARY", "PLAIN_DICTIONARY"})
 Footer = dict[bytes, bytes]
 # What Arrow raises of files that are damaged or no Parquet, from where it notices.
 UNREADABLE = (OSError, ValueError, LookupError, ArithmeticError, MemoryError, TypeError, pa.ArrowException)
@@ -60,10 +67,13 @@ def write_rows(path: Path, table: str, rows: pa.Table, footer: dict[str, str]) -
         writer.add_key_value_metadata(told | {CHECKS_KEY.decode(): " ".join(digests)})
 
 
-def read_rows(path: Path, columns: list[str] | None = None, *, check: bool = True) -> pa.Table:
+def read_rows(
+    path: Path, columns: list[str] | None = None, *, check: bool = True, most_rows: int | None = None
+) -> pa.Table:
     """All columns, or those of some that are there; lists have their lengths again. The footer is the table's metadata.
 
-    check: whether what is read is compared with its digests, where the file has any.
+    check: whether what is read is compared with its digests, where the file has any. most_rows: that the shard may
+    have, or SMALL_ROWS; nothing of a file with more is read, nor of one that unpacks to far more than its size.
 
     Raises:
         UnknownVersionError: its version is not known here.
@@ -71,20 +81,64 @@ def read_rows(path: Path, columns: list[str] | None = None, *, check: bool = Tru
         UNREADABLE: it cannot be read.
     """
     schema = TABLES[path.parent.name]
-    with pq.ParquetFile(path, page_checksum_verification=check) as file:
+    if not path.is_file():
+        raise FileNotFoundError(path) if not path.exists() else DamagedShardError("it is no file")
+    metadata = pq.read_metadata(path)
+    _check_size(path, metadata, most_rows)
+    texts = [
+        name for name in metadata.schema.names if name in schema.names and pa.types.is_string(schema.field(name).type)
+    ]
+    options: dict[str, Any] = {"metadata": metadata, "page_checksum_verification": check, "read_dictionary": texts}
+    with pq.ParquetFile(path, **options) as file:
         names, footer = file.schema_arrow.names, file.metadata.metadata or {}
         if VERSION_KEY in footer and version_of(footer) not in READABLE:
             raise UnknownVersionError(version_of(footer))
         digests = _digests(names, footer) if check else {}
         _check_names(names, path.parent.name, version_of(footer))
         rows = file.read(None if columns is None else [name for name in columns if name in names])
-    rows = _with_list_lengths(rows, schema)
+    rows = _with_list_lengths(_with_texts(rows), schema)
     for field in rows.schema:
         if field.type != schema.field(field.name).type:
             raise DamagedShardError(f"its column {field.name} is of type {field.type}")
         if digests and column_digest(field.name, rows.column(field.name)) != digests[field.name]:
             raise DamagedShardError(f"the values of {field.name} are not those that were written")
     return rows.replace_schema_metadata(footer)
+
+
+def _check_size(path: Path, metadata: Any, most_rows: int | None) -> None:
+    """Refuse a file before anything of it is unpacked.
+
+    A text that repeats is stored once, so that its size tells nothing; other columns are stored row by row.
+
+    Raises:
+        DamagedShardError: it is larger than a shard can be.
+    """
+    if most_rows is not None and metadata.num_rows > max(most_rows, SMALL_ROWS):
+        raise DamagedShardError(f"it has {metadata.num_rows} rows, and {most_rows} are planned")
+    unpacked = repeated = 0
+    for group in range(metadata.num_row_groups):
+        for number in range(metadata.num_columns):
+            column = metadata.row_group(group).column(number)
+            unpacked += column.total_uncompressed_size
+            if not set(column.encodings) <= ENCODINGS:
+                raise DamagedShardError(f"its {column.path_in_schema} is stored as this program never does")
+            if column.path_in_schema == "image.bytes" and column.has_dictionary_page:  # as earlier versions did
+                repeated = max(repeated, column.num_values * column.total_uncompressed_size)
+    if repeated > MOST_REPEATED:
+        raise DamagedShardError("its pictures may unpack to more than memory can hold")
+    if unpacked > MOST_EXPANSION * path.stat().st_size + SMALL_BYTES:
+        raise DamagedShardError(f"it unpacks to {unpacked >> 20} MiB, more than a file of its size can hold")
+
+
+def _with_texts(rows: pa.Table) -> pa.Table:
+    """Texts as such, once it is known that none is too long to be repeated."""
+    for i, field in enumerate(rows.schema):
+        if pa.types.is_dictionary(field.type):
+            for chunk in rows.column(i).chunks:
+                if (pc.max(pc.binary_length(chunk.dictionary)).as_py() or 0) > MOST_TEXT_BYTES:
+                    raise DamagedShardError(f"its {field.name} has a text of more than {MOST_TEXT_BYTES} bytes")
+            rows = rows.set_column(i, field.name, rows.column(i).cast(field.type.value_type))
+    return rows
 
 
 def version_of(footer: Footer) -> str:

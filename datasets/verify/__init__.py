@@ -14,11 +14,12 @@ from datasets.store.dataset import Dataset
 from datasets.store.digest import table_digest
 from datasets.store.keys import fault_of_keys
 from datasets.store.manifest import Entry, content_of, shard_entry
+from datasets.store.planned_rows import fault_of_images, fault_of_truth
 from datasets.store.refusals import SHARD_NAME, ForeignShardError
 from datasets.store.shard_file import DIGEST_KEY
+from datasets.store.values import fault_of_values
 from datasets.verify.images import image_problems
 from datasets.verify.manifest import manifest_problems, recipe_problem
-from datasets.verify.planned_rows import fault_of_frames, fault_of_keypoints
 from datasets.verify.problems import Kind, Problem, damaged_file, missing_file, unplanned_file
 
 OF_THE_PLAN = ("frames", "keypoints")  # tables that every dataset has whole
@@ -54,7 +55,7 @@ def shard_problem(dataset: Dataset, path: Path) -> Problem | None:
         rows = Dataset(dataset.root, dataset.recipe).stored_rows(path)
     except UserError as error:
         return Problem(path, Kind.FOREIGN if isinstance(error, ForeignShardError) else Kind.DAMAGED, str(error))
-    fault = fault_of_keys(dataset.recipe, path, rows) or _fault_of_content(rows) or _fault_of_table(dataset, path, rows)
+    fault = _fault_of_rows(dataset, path, rows) or _fault_of_content(rows) or _fault_of_table(dataset, path, rows)
     return damaged_file(path, dataset.root, fault) if fault else None
 
 
@@ -68,11 +69,14 @@ def _fault_of_content(rows: pa.Table) -> str | None:
     return None if digest == stated else "its rows do not match the hash in its footer"
 
 
+def _fault_of_rows(dataset: Dataset, path: Path, rows: pa.Table) -> str | None:
+    return fault_of_keys(dataset.recipe, path, rows) or fault_of_values(path.parent.name, rows)
+
+
 def _fault_of_table(dataset: Dataset, path: Path, rows: pa.Table) -> str | None:
-    index = dataset.index_of(path)
-    if path.parent.name == "frames":
-        return fault_of_frames(dataset.recipe, index, rows)
-    return fault_of_keypoints(dataset.recipe, index, rows) if path.parent.name == "keypoints" else None
+    table, index = path.parent.name, dataset.index_of(path)
+    fault = fault_of_truth(dataset.recipe, table, index, rows)
+    return fault or (fault_of_images(dataset.recipe, index, rows) if table == "frames" else None)
 
 
 def _missing(dataset: Dataset) -> Iterator[Problem]:

@@ -28,6 +28,7 @@ from eposit.compiled.layout import (
     RESIDUALS,
     SCRATCH,
     SEEN,
+    SORTED,
     STARTS,
     WEIGHTS,
 )  # fmt: skip
@@ -44,6 +45,7 @@ KEPT = 6  # poses of triangles that are followed
 KEPT_POSES, KEPT_SUMS = STARTS + 48, SCRATCH + 60
 ROUNDS = 3  # of choosing the nearest points and fitting them
 FALSE_ALARM = 0.01  # share of images without a wrong point that may lose one
+MANY, SHARE = 256, 32  # chosen points from which a thirty-second of them is added at once
 SCALE_FLOOR_PX = 1e-6  # scatter below this is rounding
 IMAGE_CIRCLE_ALLOWANCE = 0.05  # share of the radius by which noise may lift a point over the image circle
 
@@ -125,13 +127,15 @@ def trimmed(w, n, least):
 
 @compiled(NOTHING, W, WHOLE, WHOLE, WHOLE, NUMBER)
 def search_forward(w, n, least, there, variance):
-    """Add the nearest point, one at a time, until a test refuses one or all that are `there` are chosen.
+    """Add the nearest points until a test refuses one or all that are `there` are chosen.
 
     The test: the squared residual of the nearest point outside, over its variance given the pose of those inside,
     has an F distribution with 2 and the pose's degrees of freedom, whose tail is (1 + 2 x / f)^(-f / 2). variance: of
-    the residuals; 0 where it is unknown.
+    the residuals; 0 where it is unknown. One point is added at a time; of MANY chosen points a share at once, if the
+    farthest of them passes the same test, so that the work grows as the number of points and not as its square.
     """
-    for m in range(least, there):
+    m = least
+    while m < there:
         fit(w, n, MINIMA)
         total, freedom, tail = distances(w, n, MINIMA), 2.0 * m - 6.0, FALSE_ALARM / (m + 1.0)
         nearest = math.inf
@@ -145,7 +149,14 @@ def search_forward(w, n, least, there, variance):
             scale = max(total / freedom, SCALE_FLOOR_PX * SCALE_FLOOR_PX)
         if not nearest <= 2.0 * scale * limit:
             return
-        choose(w, n, m + 1)
+        step = min(m // SHARE, there - m) if m >= MANY else 1
+        while step > 1:
+            smallest(w, n, m + step)
+            if w[POINTS + SORTED * n + m + step - 1] <= 2.0 * scale * limit:
+                break
+            step //= 2
+        m += max(step, 1)
+        choose(w, n, m)
 
 
 @compiled(WHOLE, W, WHOLE, POINTER, WHOLE, POINTER, WHOLE)

@@ -61,7 +61,9 @@ def _candidates(points_in_obj: Array, offsets: Array) -> CameraCandidates:
     obj, pixels = points_in_obj[order], offsets[:, order]
     scale = np.max(np.abs(pixels - pixels[:, :1]), axis=(1, 2))
     edge = obj[1] - obj[0]
-    along, reach = (obj[2:] - obj[0]) @ edge / (edge @ edge), np.sum((obj[2:] - obj[0]) ** 2, axis=1) / (edge @ edge)
+    with np.errstate(all="ignore"):  # points that coincide, or whose squares no number holds, give no root
+        length2 = edge @ edge
+        along, reach = (obj[2:] - obj[0]) @ edge / length2, np.sum((obj[2:] - obj[0]) ** 2, axis=1) / length2
     scale = np.where(scale > 0.0, scale, 1.0)
     system = System(np.ascontiguousarray((pixels / scale[:, None, None]).transpose(2, 1, 0)), along, reach)
     roots = depth_ratios(system)

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from eposit.arrays import Array
+from eposit.arrays import Array, as_numbers
 from eposit.camera import Camera
 from eposit.refine import ldl6
 from eposit.refine.reprojection import Observations, equations
+
+LEAST_SIGMA, MOST_SIGMA = 1e-75, 1e75  # px: its square and the inverse of that are numbers
 
 
 def whitening(sigma_px: Array | None, n: int) -> Array:
@@ -24,14 +26,18 @@ def whitening(sigma_px: Array | None, n: int) -> Array:
     """
     if sigma_px is None:
         return np.repeat(np.eye(2)[:, :, None], n, axis=2)
-    sigma = np.asarray(sigma_px, dtype=np.float64)
+    sigma = as_numbers(sigma_px, "sigma_px")
     if sigma.shape in ((), (n,)):
-        if not (np.all(np.isfinite(sigma)) and np.all(sigma > 0.0)):
-            raise ValueError("sigma_px has values that are not positive; give standard deviations above 0 px")
+        if not np.all((sigma > LEAST_SIGMA) & (sigma < MOST_SIGMA)):
+            raise ValueError(
+                "sigma_px has values that are not positive, or out of all bounds; give standard deviations above 0 px"
+            )
         return np.eye(2)[:, :, None] / np.broadcast_to(sigma, n)
     if sigma.shape != (n, 2, 2):
         raise ValueError(f"sigma_px has shape {sigma.shape}; it must be a scalar, ({n},) or ({n}, 2, 2)")
     try:
+        if not np.all(np.isfinite(sigma)):
+            raise np.linalg.LinAlgError
         lower = np.linalg.cholesky(sigma)
     except np.linalg.LinAlgError:
         raise ValueError("sigma_px has a covariance that is not positive definite; check the (2, 2) blocks") from None

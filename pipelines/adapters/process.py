@@ -138,16 +138,36 @@ def _serve(pipe: Connection, name: str, form: Form) -> None:
     os.dup2(2, 1)
     what = f"{form.option} {name}"
     try:
-        function = load_function(name, form.option)
+        function = _tamed(load_function, name, form.option)
         pipe.send(check_call(function, what, form.text, form.count, form.keyword))
         while True:
             arguments, keywords = pipe.recv()
             notes: list[str] = []
-            answer = attempt(functools.partial(function, *arguments, **keywords), what, notes.append)
+            answer = attempt(functools.partial(_tamed, function, *arguments, **keywords), what, notes.append)
             if os.getpid() != own:  # the function has forked, and came back twice
                 os._exit(0)
             pipe.send((answer, notes))
     except UserError as error:
         pipe.send(error)
+    except RaisedToEndError as error:
+        pipe.send(UserError(f"{what}: importing it failed with {error}; mend it"))
     except EOFError:
         return
+
+
+class RaisedToEndError(Exception):
+    """What a user's function raised to end its process, as KeyboardInterrupt; the message is its name and text."""
+
+
+def _tamed(function: Callable[..., Any], *arguments: Any, **keywords: Any) -> Any:
+    """What a function gives; what it raises to end its process is a failure of one image as any other.
+
+    Raises:
+        Exception: what the function raised.
+    """
+    try:
+        return function(*arguments, **keywords)
+    except (Exception, SystemExit):
+        raise
+    except BaseException as error:
+        raise RaisedToEndError(f"{type(error).__name__}: {error}"[:300].rstrip(": ")) from None

@@ -13,6 +13,9 @@ from eposit import Camera, Pose, Solution, Status
 from eposit.arrays import Array
 from eposit.solution import STATUS_TYPE
 
+FARTHEST = 1e30  # of a position, in any unit: squares of it, and their covariances, are numbers that tables can have
+MOST_LETTERS = 200  # of a status that a user's function or file gives
+
 
 class Solver(Protocol):
     """A function that solves n points in one image, (n, 2) px, or in b images, (b, n, 2) px."""
@@ -40,9 +43,9 @@ class PoseResult:
 
 
 def pose_result(R: ArrayLike, t: ArrayLike) -> PoseResult:
-    """A pose as an answer; one that is not finite is none. t: (3,) or (3, 1)."""
+    """A pose as an answer; one that is not finite, or beyond FARTHEST, is none. t: (3,) or (3, 1)."""
     rotation, position = np.asarray(R, dtype=np.float64), np.asarray(t, dtype=np.float64).reshape(3)
-    if not (np.all(np.isfinite(rotation)) and np.all(np.isfinite(position))):
+    if not (np.all(np.isfinite(rotation)) and np.all(np.abs(position) < FARTHEST)):
         return PoseResult(Status.NO_SOLUTION)
     return PoseResult(Status.OK, rotation, position)
 

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from datasets.errors import UserError
 from eposit import Camera, Solution, Status
 from eposit.arrays import Array
-from pipelines.adapters.results import PoseResult, Solver, checked, gather, pose_result
+from pipelines.adapters.results import MOST_LETTERS, PoseResult, Solver, checked, gather, pose_result
 
 NAME = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*(\.[^\W\d]\w*)*")
 SIGMA = "sigma_px"
@@ -165,7 +165,7 @@ def _answer(R: Any, t: Any, status: Any, what: str) -> PoseResult:
     if not _is_status(status):
         raise UserError(f'{what} gave the status {status!r}; it must be a text, "ok" or the reason of a failure')
     if status != Status.OK:
-        return PoseResult(str(status))
+        return PoseResult(str(status)[:MOST_LETTERS].encode("utf-8", "replace").decode())
     if R is None or t is None:
         return PoseResult(Status.NO_SOLUTION)
     rotation = _numbers(R, (3, 3), f"{what} gave R")
@@ -194,7 +194,7 @@ def _numbers(value: Any, shape: tuple[int, ...], what: str) -> Array:
 def _fault(answer: PoseResult) -> str | None:
     """What is wrong with a pose that is said to be one."""
     if pose_result(answer.R, answer.t).status != Status.OK:
-        return "a pose that is not finite, with the status ok"
+        return "a pose that is not finite or out of all bounds, with the status ok"
     if np.abs(answer.R.T @ answer.R - np.eye(3)).max() > ROTATION_TOLERANCE or np.linalg.det(answer.R) < 0.0:
         return "an R that is no rotation, with the status ok"
     return None

@@ -21,7 +21,7 @@ from datasets.store.digest import table_digest
 from eposit import Pose, Status
 from eposit.arrays import Array
 from pipelines.adapters.registry import solver_names
-from pipelines.adapters.results import PoseResult, pose_result
+from pipelines.adapters.results import MOST_LETTERS, PoseResult, pose_result
 from pipelines.stages import score
 from pipelines.stages.estimate import path_of_shard
 from pipelines.stages.estimate_images import system_rows
@@ -101,7 +101,7 @@ def read_poses(path: Path) -> dict[int, PoseResult]:
     t = np.stack([numbers[name] for name in position], axis=1)
     statuses = [str(status or "").strip() or Status.OK for status in columns.get("status", [None] * len(frames))]
     return {
-        frame: _pose(path, frame, R[i], t[i]) if status.lower() == Status.OK else PoseResult(status)
+        frame: _pose(path, frame, R[i], t[i]) if status.lower() == Status.OK else PoseResult(status[:MOST_LETTERS])
         for i, (frame, status) in enumerate(zip(frames, statuses, strict=True))
     }
 

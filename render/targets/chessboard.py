@@ -17,6 +17,7 @@ from eposit.arrays import Array
 from render.targets import PATTERN_MEANING
 from render.targets.lattice import Lattice, chess_lattice
 from render.targets.sheet import Sheet
+from render.targets.typed import check_types
 
 CIRCLE = "circle"
 MAX_SQUARES, MAX_MARGIN = 24, 3.0  # the map of the light has 100 x 100 points in a square
@@ -43,6 +44,7 @@ class Chessboard:
     circle: Annotated[float, "reflectance of the circle"] = 0.04
 
     def __post_init__(self) -> None:
+        check_types(self)
         self._check_squares()
         for name in ("square_mm", "circle_radius_mm", "circle_height_mm"):
             if not getattr(self, name) > 0.0:

@@ -12,6 +12,7 @@ import numpy as np
 from eposit.arrays import Array
 from render.targets.lattice import Lattice
 from render.targets.sheet import BendAxis, Sheet
+from render.targets.typed import check_types
 
 MAX_LINES = 255  # of a lattice along x or y: what the renderer's tables hold
 MAX_MARGIN_MM = 1e4
@@ -40,6 +41,7 @@ class PrintedBoard(ABC):
     ] = "x"
 
     def __post_init__(self) -> None:
+        check_types(self)
         if not 0.0 <= self.margin_mm <= MAX_MARGIN_MM:
             raise ValueError(f"target margin_mm is {self.margin_mm}; it must lie in 0 to {MAX_MARGIN_MM:g} mm")
         for name in ("white", "black"):

@@ -34,6 +34,10 @@ MISCHIEF = """
                 time.sleep(600)
         if image == "infinite":
             return np.eye(3), [np.inf, 0.0, 1.0]
+        if image == "far":
+            return np.eye(3), [1e200, 0.0, 1.0]
+        if image == "interrupt":
+            raise KeyboardInterrupt
         if image == "print":
             print("so many words")
         if image == "recurse":
@@ -51,7 +55,9 @@ ENDS = {
     "leave": "SystemExit: 4",
     "hang": "took longer than 5 s",
     "crash": "ended its process, which was ended by SIGSEGV",
-    "infinite": "a pose that is not finite, with the status ok",
+    "infinite": "a pose that is not finite or out of all bounds, with the status ok",
+    "far": "a pose that is not finite or out of all bounds, with the status ok",
+    "interrupt": "RaisedToEndError: KeyboardInterrupt",
     "recurse": "RecursionError: maximum recursion depth exceeded",
 }
 HARMLESS = ("fork", "fork and stay", "print", "")
@@ -92,6 +98,7 @@ def test_a_process_that_loses_its_pipe_is_a_status(name):
     [
         ("import os; os._exit(0)", "importing it failed: it ended its process, which ended with exit code 0"),
         ("while True: pass", "importing it failed: it took longer than 30 s"),
+        ("raise KeyboardInterrupt", "importing it failed with KeyboardInterrupt; mend it"),
         ("1 / 0", "failed with ZeroDivisionError: division by zero"),
     ],
 )
