@@ -20,6 +20,7 @@ from eposit.compiled.layout import (
     MOST_MINIMA,
     MOST_STARTS,
     PERSPECTIVE,
+    PLANE,
     POINTS,
     RAYS,
     REACH,
@@ -43,6 +44,7 @@ FLAT_RATIO = 0.2  # the same ratio, below which the planar start is tried
 FEW_POINTS = 5  # up to so many points all poses of a triangle are tried, of more the best two
 NARROW = 0.5  # reach^2 over thickness and distance below which an object is seen nearly in parallel
 FAITHFUL = 0.1  # misfit over angular thickness below which a narrow object has one pose
+NEAR_COST = 25.0  # cost of a mirrored pose over the minimum's and one a point, above which perspective has decided
 TURN, MISFITS = SCRATCH + 60, SCRATCH + 60
 
 
@@ -151,6 +153,26 @@ def other_starts(w, n, starts):
     return count + triangle_starts(w, n, starts + 12 * count)
 
 
+@compiled(NOTHING, W, WHOLE, WHOLE)
+def mirrored_pose(w, pose, out):
+    """At out the pose whose plane is mirrored at right angles to the ray of its centroid.
+
+    The plane's points keep their places across the ray, and so nearly their image: the other pose of a plane seen from
+    afar, exact where its depth does not count. With v the ray and k the normal (I - 2 v v^T) R (I - 2 k k^T).
+    """
+    far2 = w[pose + 9] ** 2 + w[pose + 10] ** 2 + w[pose + 11] ** 2
+    for j in range(3):
+        along = w[pose + 9] * w[pose + j] + w[pose + 10] * w[pose + 3 + j] + w[pose + 11] * w[pose + 6 + j]
+        for i in range(3):
+            w[out + 3 * i + j] = w[pose + 3 * i + j] - 2.0 * w[pose + 9 + i] * along / far2
+    for i in range(3):
+        row = out + 3 * i
+        along = w[row] * w[PLANE + 6] + w[row + 1] * w[PLANE + 7] + w[row + 2] * w[PLANE + 8]
+        for j in range(3):
+            w[row + j] -= 2.0 * along * w[PLANE + 6 + j]
+        w[out + 9 + i] = w[pose + 9 + i]
+
+
 @compiled(WHOLE, W, WHOLE, WHOLE)
 def is_seen(w, n, pose):
     """Whether the lens sees all points: a law is continued past its largest angle, where a mirror image may fit."""
@@ -228,6 +250,10 @@ def all_minima(w, n, refine):
     if refine == 0:
         return unrefined(w, n, count)
     known = descend_all(w, n, count, known, 0.0)
+    if known == 1 and w[FLATNESS] < FLAT_RATIO:  # both starts have come to one minimum: the other's own start
+        mirrored_pose(w, MINIMA, STARTS)
+        if cost_at(w, n, STARTS) < NEAR_COST * (w[COSTS] + n):
+            known = descend_all(w, n, 1, known, 0.0)
     if known == 0:
         known = descend_all(w, n, triangle_starts(w, n, STARTS), 0, 0.0)
     return known

@@ -20,7 +20,7 @@ from pipelines.paper.simulation.comparison import (
 )
 from pipelines.statistics import Interval, percent, rate
 
-PINHOLE_ONLY = ("GPnPf", "GPnPf, principal point", "OpenCV EPNP", "PoseLib p4pf")
+PINHOLE_ONLY = ("GPnPf", "OpenCV EPNP", "PoseLib p4pf")
 LINES = {0: [-3.0, 3.0], 1: [-3.0, 3.0], 5: [-20.0, 20.0]}  # the paper's, by component
 INTRO = "The orthogonal lens. Solvers for the pinhole get rectified points; PnPfr has no knowledge of the lens."
 

@@ -24,8 +24,8 @@ from pipelines.paper.simulation.comparison import (
 
 INTRO = (
     "The perspective lens. EPOSIT has the paper's camera: nominal focal length, true principal point subtracted from x "
-    "and y. OPnP and the solvers in the lower rows have the true camera, GPnPf and PnPfr the image centre. Rows that "
-    "name a point have it as principal point everywhere, so that solvers can be compared under the same assumption."
+    "and y. OPnP and the solvers in the lower rows have the true camera, GPnPf and PnPfr the image centre; a "
+    "table of its own compares them under the same assumption."
 )
 
 
