@@ -78,7 +78,7 @@ class Circle:
 
 
 def find_circle(
-    image: Grey, board: BoardMap, blur_px: float, contrast: float, target: Chessboard, misfit: float = 0.0
+    image: Picture, board: BoardMap, blur_px: float, contrast: float, target: Chessboard, misfit: float = 0.0
 ) -> Circle | None:
     """The circle's centre, or None if there is no dark disc where the board puts it.
 
@@ -98,7 +98,7 @@ def find_circle(
     return _fitted_circle(image, board, blur_px, contrast, target, misfit, _unsure(board, target))
 
 
-def _means(image: Grey, by: int) -> NDArray[np.float32]:
+def _means(image: Picture, by: int) -> NDArray[np.float32]:
     """A picture of the means of `by` x `by` pixels; what is left at the right and below is cut off."""
     height, width = (side // by for side in image.shape)
     whole = image[: height * by, : width * by].astype(np.float32)
