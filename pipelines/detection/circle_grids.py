@@ -11,15 +11,19 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
+from scipy.spatial import cKDTree
 
 from eposit.arrays import Array
 from pipelines.detection.board_map import BoardMap
 from pipelines.detection.consistency import Corners, drop_inconsistent
+from pipelines.detection.disc_candidates import MOST_BLOBS, find_blobs, likely_discs
 from pipelines.detection.finders import Grey, textured_region
 from pipelines.detection.seen_points import SeenPoints
 from render.targets.circle_grid import CircleGrid
 
-LEAST_AREA_PX = 12.0
+DOT_SCALE, DOT_PIXELS = 2.0, 5e6  # pixels of the picture of dots to one of the picture, and of the whole, at most
+DOT_REACH, DOT_MARGIN = 2, 20.0  # px of a dot to each side, and of the picture around the dots
+CLUSTERING = cv2.CALIB_CB_CLUSTERING
 ROUNDS = 3  # of a map through the centres, and centres through the map
 RIM_STEPS = 64
 CLEAR = 0.92  # of the way to the next disc's rim that a disc's window may reach
@@ -31,22 +35,44 @@ START_LIMIT = 0.25  # spacings that a centroid may lie from where the map puts i
 def find_circle_grid(image: Grey, target: CircleGrid) -> SeenPoints | None:
     """The centres of all discs in the target's order, as OpenCV sees them; None if it does not see the whole grid."""
     region = textured_region(image)
-    part = np.ascontiguousarray(image[region.pixels])
+    blobs = find_blobs(np.ascontiguousarray(image[region.pixels]))
+    count, size = target.columns * target.rows, (target.columns, target.rows)
+    points = likely_discs(blobs, count, _nearest(target.pattern_points) / target.diameter_mm)
+    if len(points) < count:
+        return None
+    drawn, first_px, scale = _dots(points)
     shape = cv2.CALIB_CB_ASYMMETRIC_GRID if target.asymmetric else cv2.CALIB_CB_SYMMETRIC_GRID
-    size = target.columns, target.rows
-    for flags in (shape, shape | cv2.CALIB_CB_CLUSTERING):
-        found, centres = cv2.findCirclesGrid(part, size, flags=flags, blobDetector=_blob_detector(part.size))
+    searches = (shape, shape | CLUSTERING) if len(points) <= MOST_BLOBS else (shape | CLUSTERING,)
+    for flags in searches:
+        found, centres = cv2.findCirclesGrid(drawn, size, flags=flags, blobDetector=_dot_detector())
         if found:
-            grid = np.asarray(centres, np.float64).reshape(target.rows, target.columns, 2)
-            points = _upright(grid, target).reshape(-1, 2) + [region.x, region.y]
-            return SeenPoints(np.arange(len(points)), points, "circles")
+            places = np.asarray(centres, np.float64).reshape(-1, 2) / scale + first_px
+            grid = points[np.asarray(cKDTree(points).query(places)[1])].reshape(target.rows, target.columns, 2)
+            ordered = _upright(grid, target).reshape(-1, 2) + [region.x, region.y]
+            return SeenPoints(np.arange(len(ordered)), ordered, "circles")
     return None
 
 
-def _blob_detector(pixels: int) -> cv2.SimpleBlobDetector:
+def _dots(points: Array) -> tuple[Grey, Array, float]:
+    """A picture of the points as black dots, where it begins, px, and its pixels to one.
+
+    OpenCV's search of a grid takes a picture only, and finds its blobs anew: dots are found at once.
+    """
+    low, high = points.min(axis=0) - DOT_MARGIN, points.max(axis=0) + DOT_MARGIN
+    scale = min(DOT_SCALE, float(np.sqrt(DOT_PIXELS / np.prod(high - low))))
+    width, height = np.ceil((high - low) * scale).astype(int)
+    drawn = np.full((height, width), 255, np.uint8)
+    for x, y in np.rint((points - low) * scale).astype(int):
+        drawn[y - DOT_REACH : y + DOT_REACH + 1, x - DOT_REACH : x + DOT_REACH + 1] = 0
+    return drawn, low, scale
+
+
+def _dot_detector() -> cv2.SimpleBlobDetector:
     parameters = cv2.SimpleBlobDetector.Params()
-    parameters.minArea, parameters.maxArea = LEAST_AREA_PX, pixels / 4.0
-    parameters.minDistBetweenBlobs = np.sqrt(LEAST_AREA_PX)
+    parameters.minThreshold, parameters.maxThreshold, parameters.thresholdStep = 100.0, 200.0, 50.0
+    parameters.minRepeatability, parameters.minDistBetweenBlobs = 1, 1.0
+    parameters.filterByArea = parameters.filterByCircularity = parameters.filterByConvexity = False
+    parameters.filterByInertia = False
     return cv2.SimpleBlobDetector.create(parameters)
 
 
