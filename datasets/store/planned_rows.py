@@ -21,6 +21,7 @@ TOLERANCE = 1e-6  # relative, and absolute below 1: far above rounding, far belo
 SAME = ("frame_id", "pose_id", "render_seed", "sensor_seed")  # columns that are a frame's own values
 OF_CAMERA = {"camera_name": "name", "lens": "lens", "width_px": "width", "height_px": "height"}
 QUATERNION, POSITION = ("q_w", "q_x", "q_y", "q_z"), ("t_x_mm", "t_y_mm", "t_z_mm")
+REGION = ("region_x_px", "region_y_px", "region_width_px", "region_height_px")
 OF_LENS = {"fx_px": "fx", "fy_px": "fy", "cx_px": "cx", "cy_px": "cy"}
 
 
@@ -46,8 +47,17 @@ def _fault_of_frames(recipe: Recipe, index: int, rows: pa.Table) -> str | None:
     coefficients = [(*frame.camera.coefficients, *[0.0] * MOST_COEFFICIENTS)[:MOST_COEFFICIENTS] for frame in frames]
     close |= dict(zip((f"k{i}" for i in range(1, 1 + MOST_COEFFICIENTS)), np.array(coefficients).T, strict=True))
     wrong = [name for name, values in exact.items() if name in rows.column_names and rows[name].to_pylist() != values]
-    told = _told([*wrong, *_far(rows, close)])
+    told = _told([*wrong, *_far(rows, close)]) or _fault_of_regions(frames, rows)
     return told or (_fault_of_sizes(frames, rows) if "image" in rows.column_names else None)
+
+
+def _fault_of_regions(frames: Sequence[Frame], rows: pa.Table) -> str | None:
+    if any(name not in rows.column_names for name in REGION):
+        return None
+    x, y, width, height = (rows[name].to_numpy().astype(np.int64) for name in REGION)
+    right, bottom = (np.array([getattr(frame.camera, name) for frame in frames]) for name in ("width", "height"))
+    inside = (x >= 0) & (y >= 0) & (width > 0) & (height > 0) & (x + width <= right) & (y + height <= bottom)
+    return None if np.all(inside) else "its region lies outside the picture"
 
 
 def _fault_of_sizes(frames: Sequence[Frame], rows: pa.Table) -> str | None:

@@ -6,9 +6,10 @@ import hashlib
 import os
 from pathlib import Path
 
-from render.world.scene_file import SceneFileError, read_scene_file
+from render.world.scene_file import SceneFileError, read_file, read_scene_file
 
 SCENE_SUFFIX = ".xml"
+MOST_BYTES = 1 << 30  # of an environment map, or of any file that a scene reads
 
 
 def file_digest(path: Path) -> str:
@@ -22,10 +23,9 @@ def file_digest(path: Path) -> str:
     scene = path.suffix.lower() == SCENE_SUFFIX
     total = hashlib.sha256()
     for part in read_scene_file(path).files if scene else (path,):
-        try:
-            data = part.read_bytes()
-        except OSError as error:
-            raise SceneFileError(f"{part} cannot be read ({error.strerror}); give the path of a file") from None
+        data = read_file(part, MOST_BYTES + 1)
+        if len(data) > MOST_BYTES:
+            raise SceneFileError(f"{part} has more than {MOST_BYTES >> 20} MiB; give a smaller file")
         name = os.path.relpath(part, path.resolve().parent) if scene else ""
         total.update(f"{name}:{len(data)};".encode() + data)
     return total.hexdigest()

@@ -7,6 +7,7 @@ anew from the parsed elements with absolute paths, so that it cannot understand 
 
 from __future__ import annotations
 
+import errno
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -24,6 +25,21 @@ NOT_OURS = ("integrator", "sensor", "film", "sampler")  # at the top level: the 
 
 class SceneFileError(ValueError):
     """A scene file that cannot be used; the message is one sentence with the remedy."""
+
+
+def read_file(path: Path, most_bytes: int, what: str = "") -> bytes:
+    """The first bytes of a regular file; a device or a pipe might never end. what: before its name in a message.
+
+    Raises:
+        SceneFileError: it cannot be read.
+    """
+    try:
+        if path.exists() and not path.is_dir() and not path.is_file():
+            raise OSError(errno.EINVAL, "it is a device or a pipe", str(path))
+        with open(path, "rb") as file:
+            return file.read(most_bytes)
+    except OSError as error:
+        raise SceneFileError(f"{what}{path} cannot be read ({error.strerror}); give the path of a file") from None
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,12 +98,7 @@ class _Reader:
                 element.set(attribute, str(self._inside(element.get(attribute, ""))))
 
     def _parsed(self, path: Path) -> Element:
-        try:
-            data = path.read_bytes()
-        except OSError as error:
-            raise SceneFileError(
-                f"scene file {path} cannot be read ({error.strerror}); give the path of a scene"
-            ) from None
+        data = read_file(path, MAX_BYTES + 1, "scene file ")
         self.bytes_read += len(data)
         if self.bytes_read > MAX_BYTES:
             raise SceneFileError(

@@ -47,6 +47,7 @@ CASES = {
     "another lens": ("frames", column("lens", "equisolid"), "its lens is not what the recipe plans"),
     "another coefficient": ("frames", column("k2", 0.1), "its k2 is not what the recipe plans"),
     "another nominal camera": ("frames", column("nominal_f_px", 1.0), "its nominal_f_px is not what the recipe plans"),
+    "another region": ("frames", column("region_width_px", 2**31 - 1), "its region lies outside the picture"),
     "another truth": ("keypoints", column("x_px", 5.0), "its x_px is not what the recipe plans"),
     "no picture": ("frames", column("image", {"bytes": None, "path": None}), "a row without a picture"),
     "another format": (

@@ -110,3 +110,10 @@ def test_a_hash_over_the_scene_and_its_meshes_that_moves_with_the_folder(folder)
     with pytest.raises(SceneFileError, match="put the old one back"):
         require_unchanged(path, before)
     assert file_digest(Path(other / "meshes" / "box.obj")) != file_digest(folder / "meshes" / "box.obj")
+
+
+@pytest.mark.parametrize("name", ["map.exr", "scene.xml"])
+def test_a_file_that_never_ends_is_refused(name, tmp_path):
+    (tmp_path / name).symlink_to("/dev/zero")
+    with pytest.raises(SceneFileError, match="it is a device or a pipe"):
+        file_digest(tmp_path / name)
