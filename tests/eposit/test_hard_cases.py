@@ -112,9 +112,9 @@ def test_a_long_object_is_not_lost():
     """Its turn about itself is hardly seen, so that the descent goes a long way."""
     rng, camera = np.random.default_rng(8), paper_camera("stereographic")
     for _ in range(150):
-        long = rng.normal(size=(4, 3)) * (100.0, 3.0, 3.0)
+        long = rng.normal(size=(6, 3)) * (100.0, 1.0, 1.0)
         pose = poses_at(rng, long, 1, 1500.0, 180.0)
-        pixels = camera.project(pose.apply(long))[0] + 1.5 * rng.normal(size=(4, 2))
+        pixels = camera.project(pose.apply(long))[0] + 1.5 * rng.normal(size=(6, 2))
         assert eposit.solve(long, pixels, camera).status == "ok"
 
 
