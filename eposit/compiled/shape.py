@@ -62,7 +62,7 @@ def spreads(w, points, count, out):
                 for k in range(3):
                     _turn(w, S + 3 * p + k, S + 3 * q + k, c, s)
                     _turn(w, out + 3 * p + k, out + 3 * q + k, c, s)
-    w[S + 1], w[S + 2] = max(w[S + 4], 0.0), max(w[S + 8], 0.0)
+    w[S], w[S + 1], w[S + 2] = max(w[S], 0.0), max(w[S + 4], 0.0), max(w[S + 8], 0.0)  # rounding may leave less
     for i in range(2):
         for j in range(2, i, -1):
             if w[S + j] > w[S + j - 1]:

@@ -86,3 +86,40 @@ def test_five_rows_of_three_points_are_too_few():
     camera, points = paper_camera("perspective"), MARKER[[0, 1, 2, 1, 0]]
     pose = Pose(rotation_from_vector([0.2, 0.3, 0.1]), np.array([0.0, 0.0, 900.0]))
     assert eposit.solve(points, camera.project(pose.apply(points)), camera).status == "too_few_points"
+
+
+@pytest.mark.parametrize("lens", ["stereographic", "orthogonal", "equisolid"])
+def test_a_small_plane_in_any_direction_keeps_both_of_its_poses(lens):
+    """A plane's least spread is rounding, of either sign where it is turned in the object's frame.
+
+    With 1.5 px of noise on an image 10 px wide two poses cost nearly the same; that of the truth must be among them.
+    """
+    rng, camera = np.random.default_rng(7), paper_camera(lens)
+    for _ in range(60):
+        plane = rng.normal(size=(12, 3)) * (20.0, 20.0, 0.0) @ rotation_from_vector(rng.normal(size=3))
+        pose = poses_at(rng, plane, 1, 3000.0, 180.0)
+        pixels = camera.project(pose.apply(plane))[0] + 1.5 * rng.normal(size=(12, 2))
+        found = eposit.solve(plane, pixels, camera, sigma_px=1.5)
+        assert found.status == "ok"
+        everything = np.concatenate((found.cam_from_obj.R[None], found.alternatives.cam_from_obj.R))
+        nearest = np.nanmin(rotation_error_rad(everything, pose.R))
+        # Five deviations of the stated covariance, where that is sound; the other pose is up to 180 degrees away.
+        stated = np.sqrt(np.trace(found.covariance[:3, :3]))
+        assert found.covariance_unreliable or nearest < 5.0 * stated
+
+
+def test_a_long_object_is_not_lost():
+    """Its turn about itself is hardly seen, so that the descent goes a long way."""
+    rng, camera = np.random.default_rng(8), paper_camera("stereographic")
+    for _ in range(150):
+        long = rng.normal(size=(6, 3)) * (100.0, 1.0, 1.0)
+        pose = poses_at(rng, long, 1, 1500.0, 180.0)
+        pixels = camera.project(pose.apply(long))[0] + 1.5 * rng.normal(size=(6, 2))
+        assert eposit.solve(long, pixels, camera).status == "ok"
+
+
+def test_points_on_a_line_in_any_direction_have_a_status():
+    rng, camera = np.random.default_rng(9), paper_camera("equidistance")
+    for _ in range(100):
+        line = np.outer(rng.normal(size=6), rng.normal(size=3)) * 100.0 + 1000.0 * rng.normal(size=3)
+        assert eposit.solve(line, rng.uniform(400.0, 1100.0, (6, 2)), camera).status == "coplanar"
