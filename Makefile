@@ -37,8 +37,10 @@ nightly: $(SETUP)  ## two small nights, the first accepted as the second's basel
 test: $(SETUP)  ## the tests that need pip only, under 6 minutes on 2 cores
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not full and not slow"
 
-test-full: $(SETUP)  ## adds kills, a Ray cluster, and other environments: the built wheel, readers of a dataset, a browser
+test-full: $(SETUP)  ## adds kills, a Ray cluster, an object store, and other environments: the built wheel, readers of a dataset, a browser
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check "ray>=2.9" playwright
+	@# A folder of its own: it needs another pydantic than ours.
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade --target build/moto "moto[server]>=5"
 	$(BIN)/python -m pytest -m full
 
 check-slow: $(SETUP)  ## kills at random moments, two commands at once

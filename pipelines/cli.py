@@ -14,7 +14,7 @@ import typer.core
 import typer.main
 
 from datasets.errors import UserError
-from pipelines.commands import compare, nightly, plan, stages, tools
+from pipelines.commands import compare, nightly, plan, stages, tools, transfer
 from pipelines.endings import UNFINISHED, USER_ERROR, UnfinishedError, printable, say_unexpected
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)  # what a disk refuses
@@ -35,6 +35,8 @@ COMMANDS: tuple[tuple[Callable[..., None], str], ...] = (
     (compare.compare, "compare out/before out/after"),
     (tools.verify, "verify out/demo"),
     (stages.repair, "repair out/demo"),
+    (transfer.upload, "upload out/demo s3://bucket/demo"),
+    (transfer.download, "download s3://bucket/demo out/demo"),
     (tools.doctor, "doctor"),
     (tools.bench, "bench demo --only render --only solver --out bench.md"),
     (tools.paper, "paper --points-only --out out/paper"),

@@ -46,6 +46,9 @@ NoMasters = Annotated[
     typer.Option("--no-masters", help="Do not keep linear light, nine tenths of the bytes: nothing to reuse."),
 ]
 
+Url = Annotated[
+    str, typer.Argument(metavar="URL", help="s3://bucket/folder, gs://bucket/folder or file:///folder, with options.")
+]
 Frames = Annotated[
     str | None, typer.Option("--frames", metavar="N", help="As if the recipe had N frames, as 1e9. [default: its own]")
 ]

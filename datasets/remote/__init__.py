@@ -1,0 +1,1 @@
+"""Datasets in an object store: whole files are put and fetched, each visible when it is whole."""
