@@ -37,8 +37,9 @@ class Camera:
     def __post_init__(self) -> None:
         coefficients = as_numbers(self.coefficients, "camera coefficients").ravel().tolist()
         object.__setattr__(self, "coefficients", tuple(coefficients))
-        if not isinstance(self.lens, str):
-            raise ValueError(f"camera lens is a {type(self.lens).__name__}; it must be one of eposit.LENS_NAMES")
+        lens: object = self.lens
+        if not isinstance(lens, str):
+            raise ValueError(f"camera lens is a {type(lens).__name__}; it must be one of eposit.LENS_NAMES")
         for name in ("fx", "fy", "width", "height"):
             value = getattr(self, name)
             if not (_is_real(value) and math.isfinite(value) and value > 0):
@@ -104,7 +105,7 @@ class Camera:
 
 def _is_real(value: object) -> bool:
     """Whether a value is one real number, of whatever package, that float64 can hold."""
-    return isinstance(value, numbers.Real) and abs(value) <= MOST
+    return isinstance(value, numbers.Real) and abs(float(value)) <= MOST
 
 
 def _seen_angle(side: Array, z: Array) -> Array:

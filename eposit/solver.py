@@ -95,7 +95,7 @@ def solve(
 
 
 def _check(
-    method: object, refine: object, robust: object, tol: object, max_iterations: object, theta_centre: object
+    method: object, refine: object, robust: object, tol: object, max_iterations: object, theta_centre: ArrayLike | None
 ) -> None:
     """Refuse options that no solver can take.
 

@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
-import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from datasets.schema import KEYS, LATER_COLUMNS, NAN_VERSION, READABLE, SCORES_ADDED, TABLES, meanings
 from datasets.store.digest import column_digest, text_digest
 from datasets.store.nulls import is_list_of_floats
+from datasets.store.texts import longest
 
 RECIPE_KEY, VERSION_KEY, DIGEST_KEY = b"recipe", b"schema_version", b"content"
 PLACE_KEY = b"place"  # table and name of the file, so that a shard under another's name is known
@@ -135,7 +135,7 @@ def _with_texts(rows: pa.Table) -> pa.Table:
     for i, field in enumerate(rows.schema):
         if pa.types.is_dictionary(field.type):
             for chunk in rows.column(i).chunks:
-                if (pc.max(pc.binary_length(chunk.dictionary)).as_py() or 0) > MOST_TEXT_BYTES:
+                if longest(chunk.dictionary, "binary_length") > MOST_TEXT_BYTES:
                     raise DamagedShardError(f"its {field.name} has a text of more than {MOST_TEXT_BYTES} bytes")
             rows = rows.set_column(i, field.name, rows.column(i).cast(field.type.value_type))
     return rows

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from datasets.schema import LATER_COLUMNS, TABLES
 from datasets.store.nulls import is_list_of_floats, with_nans
+from datasets.store.texts import longest
 
 MOST = 1e75  # of any number's size: fourth powers stay finite
 MOST_LETTERS = 1000  # of a text
@@ -38,7 +38,7 @@ def _faults(table: str, rows: pa.Table) -> Iterator[str]:
                 yield f"its {name} has a number beyond {MOST:g}"
         elif column.null_count and name in TABLES[table].names and name not in OPTIONAL:
             yield f"its {name} has a row without a value"
-        elif pa.types.is_string(kind) and (pc.max(pc.utf8_length(column)).as_py() or 0) > MOST_LETTERS:
+        elif pa.types.is_string(kind) and longest(column, "utf8_length") > MOST_LETTERS:
             yield f"its {name} has a text of more than {MOST_LETTERS} letters"
     yield from _faults_of_images(rows)
     if "status" in rows.column_names:
@@ -51,7 +51,7 @@ def _faults(table: str, rows: pa.Table) -> Iterator[str]:
 
 def _faults_of_images(rows: pa.Table) -> Iterator[str]:
     if "image" in rows.column_names:
-        data = pc.struct_field(rows["image"].combine_chunks(), "bytes")
+        data = rows["image"].combine_chunks().field("bytes")
         if data.null_count:
             yield "it has a row without a picture"
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from datasets.recipe.model import Recipe
 from pipelines.bench.cases import chosen_frames, image_of
 from pipelines.bench.table import Figure, Row, compared
-from pipelines.bench.timing import Times, in_turn, total
 from pipelines.detection import detect_points
 from pipelines.detection.finders import SECTOR_FLAGS, SUBPIX_STOP, SUBPIX_WINDOW
+from pipelines.timing import Times, in_turn, total
 from render.targets.chessboard import Chessboard
 
 PART = "detection"

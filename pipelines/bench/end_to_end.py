@@ -13,10 +13,10 @@ from datasets.store.dataset import Dataset
 from pipelines.bench.cases import chosen_poses
 from pipelines.bench.primary_rays import NAME, primary_rays
 from pipelines.bench.table import Row, compared
-from pipelines.bench.timing import Times, in_turn, summary, timed
 from pipelines.detection import Detector
 from pipelines.stages import detect, estimate, generate, score
 from pipelines.stages.settings import Setting
+from pipelines.timing import Times, in_turn, summary, timed
 
 PART = "end to end"
 SETTING = Setting()

@@ -10,7 +10,7 @@ from datasets.recipe.model import Recipe
 from pipelines.bench.cases import chosen_frames, corner_errors, linear_of, over_background, rms
 from pipelines.bench.frame import frame_of_ours, plain
 from pipelines.bench.table import Figure, Row, compared
-from pipelines.bench.timing import in_turn
+from pipelines.timing import in_turn
 from render.frame import LinearImage
 from render.region import target_region
 

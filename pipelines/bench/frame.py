@@ -16,8 +16,8 @@ from datasets.store.images import encode_png
 from datasets.store.linear_images import write_linear
 from pipelines.bench.cases import chosen_frames, image_of, linear_of
 from pipelines.bench.table import Row, compared
-from pipelines.bench.timing import Times, in_turn, total
 from pipelines.detection import detect_points
+from pipelines.timing import Times, in_turn, total
 from render import backend
 from render.pathtraced.fisheye import sensor_dict
 from render.pathtraced.scene import reference_scene

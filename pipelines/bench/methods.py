@@ -13,7 +13,7 @@ from datasets.plan import Frame, plan
 from datasets.recipe.model import Recipe, load_recipe
 from pipelines.bench import frame as closed_form
 from pipelines.bench.table import Figure, Row, compared
-from pipelines.bench.timing import in_turn, timed
+from pipelines.timing import in_turn, timed
 from render import backend
 from render.frame import render_world
 from render.hybrid.prepare import baked_light

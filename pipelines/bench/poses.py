@@ -15,8 +15,8 @@ from pipelines.bench import first_use
 from pipelines.bench.other_pose_solvers import samplers, solvers
 from pipelines.bench.pose_problems import Problems, half_wrong, problems
 from pipelines.bench.table import Row, compared
-from pipelines.bench.timing import in_turn
 from pipelines.paper.problems import SIGMA_PX
+from pipelines.timing import in_turn
 
 PART = "poses"
 IMAGES = 50  # single calls in a measurement

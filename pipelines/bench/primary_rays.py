@@ -12,7 +12,7 @@ from datasets.plan import Frame
 from datasets.recipe.model import Recipe
 from pipelines.bench.cases import chosen_frames, linear_of
 from pipelines.bench.table import Row, compared
-from pipelines.bench.timing import Times, in_turn, total
+from pipelines.timing import Times, in_turn, total
 from render import backend
 from render.pathtraced.fisheye import sensor_dict
 from render.pathtraced.scene import bare_scene

@@ -19,7 +19,6 @@ from datasets.store.linear_images import write_linear
 from pipelines.bench.cases import chosen_frames, image_of, linear_of
 from pipelines.bench.primary_rays import NAME, primary_rays
 from pipelines.bench.table import Row, compared
-from pipelines.bench.timing import in_turn
 from pipelines.detection import detect_points
 from pipelines.detection.board_map import grid
 from pipelines.detection.circle import find_circle
@@ -29,6 +28,7 @@ from pipelines.detection.finders import SUBPIX_STOP, SUBPIX_WINDOW, find_board
 from pipelines.detection.first_map import first_map
 from pipelines.detection.statuses import PointStatus
 from pipelines.detection.textured_region import textured_region
+from pipelines.timing import in_turn
 
 PART = "profile"
 CLASSIC_FLAGS = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE

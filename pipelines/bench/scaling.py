@@ -16,8 +16,8 @@ from datasets.store.linear_images import write_linear
 from pipelines.bench.cases import chosen_poses, linear_of, scaled
 from pipelines.bench.end_to_end import by_pose, run_stages
 from pipelines.bench.table import Figure, Row, short
-from pipelines.bench.timing import in_turn
 from pipelines.detection import detect_points
+from pipelines.timing import in_turn
 from render.sensor.develop import develop
 
 PART = "growth"

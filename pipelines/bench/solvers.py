@@ -19,8 +19,8 @@ from eposit import Camera, gpnpf, opnp, pnpfr, released
 from eposit.arrays import Array
 from pipelines.adapters.registry import find_solver
 from pipelines.bench.table import Row, compared
-from pipelines.bench.timing import in_turn
 from pipelines.paper.problems import OBJECT, camera_with, helix, noisy, taken
+from pipelines.timing import in_turn
 
 PART = "solver, a pose of four points"
 BATCH = 100_000  # poses in a batch; what takes longer than a second of it gets fewer

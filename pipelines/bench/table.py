@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from pipelines.bench.timing import Times
+from pipelines.timing import Times
 
 TITLES = ("part", "ours", "ours, ms", "compared with", "that, ms", "ratio", "ratio of CPU time")
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
@@ -62,7 +63,7 @@ def likely_discs(blobs: Blobs, count: int, distance: float) -> Array:
     return blobs.points[group == fits[np.argmin(sizes[fits])]] if len(fits) else np.empty((0, 2))
 
 
-def _groups(blobs: Blobs, distance: float) -> Array:
+def _groups(blobs: Blobs, distance: float) -> NDArray[np.int32]:
     """(n,) number of the group of each blob: neighbours are in one, and a blob without enough of them is alone."""
     n = len(blobs.points)
     far, other = (np.asarray(part)[:, 1:] for part in cKDTree(blobs.points).query(blobs.points, k=NEIGHBOURS + 1))
@@ -73,4 +74,4 @@ def _groups(blobs: Blobs, distance: float) -> Array:
     enough = near.sum(axis=1) >= LEAST_NEIGHBOURS
     near &= enough[:, None] & enough[other]
     links = coo_array((np.ones(int(near.sum())), (own[near], other[near])), shape=(n, n))
-    return connected_components(links, directed=False)[1]
+    return np.asarray(connected_components(links, directed=False)[1])

@@ -26,7 +26,7 @@ from pipelines.bench.blender.scene import LENS, description
 from pipelines.bench.cases import chosen_frames, corner_errors, linear_of, over_background, rms
 from pipelines.bench.frame import frame_of_ours
 from pipelines.bench.table import Figure, Row, compared
-from pipelines.bench.timing import Times, in_turn, mean_of
+from pipelines.timing import Times, in_turn, mean_of
 from render import backend
 from render.frame import LinearImage
 from render.region import Image, target_region

@@ -11,12 +11,12 @@ import numpy as np
 import eposit
 from eposit import gpnpf, opnp, pnpfr
 from pipelines.adapters.registry import find_solver
-from pipelines.bench.timing import in_turn
 from pipelines.pages.sections import Table
 from pipelines.paper import simulation as sim
 from pipelines.paper.claims import Claim, Statement, holds_if
 from pipelines.paper.problems import OBJECT
 from pipelines.paper.simulation.comparison import SIMILAR
+from pipelines.timing import in_turn
 
 PART = "derivation"
 COMPARED = ("SQPNP", "GPnPf", "PnPfr", "OPnP")

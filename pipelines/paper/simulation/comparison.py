@@ -145,8 +145,8 @@ class Alike:
         gpnpf = "GPnPf" if point == "image centre" else f"GPnPf, {point}"
         if gpnpf in found:
             others["GPnPf"] = found[gpnpf]
-        ours = (found[f"EPOSIT, {method}, {point}"] for method in (EQUATIONS, RELEASED))
-        return Alike(point, *ours, others)
+        equations, released = (found[f"EPOSIT, {method}, {point}"] for method in (EQUATIONS, RELEASED))
+        return Alike(point, equations, released, others)
 
 
 def told_alike(both: Iterable[Alike], method: str, told: Callable[[sim.Outcome], str]) -> str:

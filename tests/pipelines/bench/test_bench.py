@@ -12,9 +12,9 @@ from pipelines.bench.primary_rays import RAYS, primary_rays
 from pipelines.bench.scaling import exponent
 from pipelines.bench.solvers import draws, solvers
 from pipelines.bench.table import TITLES, compared, markdown
-from pipelines.bench.timing import Times, in_turn, total
 from pipelines.machine import LIBRARIES, facts
 from pipelines.paper.problems import OBJECT, camera_with
+from pipelines.timing import Times, in_turn, total
 from render.region import target_region
 
 

@@ -12,7 +12,7 @@ from datasets.plan import plan
 from datasets.recipe.model import load_recipe
 from pipelines.bench.blender import NO_BPY, SCRIPT, VARIABLE, cycles
 from pipelines.bench.blender.scene import LENS, description
-from pipelines.bench.timing import Times, in_turn, mean_of
+from pipelines.timing import Times, in_turn, mean_of
 from render.light import SMOOTH_SAMPLES, lamp_irradiance
 
 
@@ -100,7 +100,7 @@ def test_requests_and_answers(tmp_path, monkeypatch):
 def test_the_mean_of_calls_in_a_row(monkeypatch):
     made, wall, cpu = [], iter((100.0, 110.0)), iter((7.0, 22.0))
     clocks = SimpleNamespace(perf_counter=lambda: next(wall), process_time=lambda: next(cpu))
-    monkeypatch.setattr("pipelines.bench.timing.time", clocks)
+    monkeypatch.setattr("pipelines.timing.time", clocks)
     assert mean_of(lambda: made.append(0), 5) == Times(2.0, 3.0)
     assert len(made) == 5
 
