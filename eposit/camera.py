@@ -37,9 +37,8 @@ class Camera:
     def __post_init__(self) -> None:
         coefficients = as_numbers(self.coefficients, "camera coefficients").ravel().tolist()
         object.__setattr__(self, "coefficients", tuple(coefficients))
-        lens: object = self.lens
-        if not isinstance(lens, str):
-            raise ValueError(f"camera lens is a {type(lens).__name__}; it must be one of eposit.LENS_NAMES")
+        if not _is_text(self.lens):
+            raise ValueError(f"camera lens is a {type(self.lens).__name__}; it must be one of eposit.LENS_NAMES")
         for name in ("fx", "fy", "width", "height"):
             value = getattr(self, name)
             if not (_is_real(value) and math.isfinite(value) and value > 0):
@@ -101,6 +100,10 @@ class Camera:
         pixels = _last_axis(points_px, 2, "points_px")
         u, v = pixels[..., 0], pixels[..., 1]
         return (u >= -0.5) & (u <= self.width - 0.5) & (v >= -0.5) & (v <= self.height - 0.5)
+
+
+def _is_text(value: object) -> bool:
+    return isinstance(value, str)
 
 
 def _is_real(value: object) -> bool:
