@@ -28,6 +28,20 @@ the views that both found.
 
 Asked is: nothing wrong, found no less often and RMS no larger than OpenCV's better one, norm {NORMALISED[0]} to
 {NORMALISED[1]}, no picture above {SLOWEST_S:g} s."""
+REASONS = {
+    "rolling-shake": "rows are moved by a wave two squares long, so that neighbours are moved against each other as by "
+    "errors of their own; nothing in one picture tells that from noise, and the stated error is too large",
+    "shadow-edge": "a corner is refused whose pixels a hard shadow crosses: they look like those of a corner that is "
+    "covered in part",
+    "hot-pixels": "a black pixel upon an edge lies within the grey values of its neighbours and is not taken out; the "
+    "corner is refused",
+    "salt-pepper": "as `hot-pixels`",
+    "small": "beside the circle, squares of 9 px leave a corner no pixels that are surely free of the circle's shade",
+    "ghost": "the reflected picture is smooth and moves neighbours alike, which the stated error takes for a misfit of "
+    "the map",
+    "flicker": "as `ghost`: light that changes over a few rows moves a row of corners alike",
+    "disc-shadow": "beside the circle, its displaced shadow reaches pixels that corners use",
+}  # by kind, why it does not hold everything
 COLUMNS = ["kind", "views", "found", "classic", "sector", "wrong", "RMS", "bias", "norm", "on shared: ours, classic",
            "ours, sector", "mean, slowest s", "classic s", "sector s"]  # fmt: skip
 
@@ -78,7 +92,10 @@ def _discs(found):
 
 
 def _short(found):
-    said = [f"- {name}: {'; '.join(faults(rows))}" for name, rows in found.items() if faults(rows)]
+    said = []
+    for name, rows in found.items():
+        short = "; ".join(faults(rows))
+        said += [f"- {name}: {short}{f' ({REASONS[name]})' if name in REASONS else ''}"] if short else []
     return "\n".join(said) or "Nothing."
 
 

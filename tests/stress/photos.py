@@ -19,6 +19,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from pipelines.machine import facts
 from tests.stress.answers import DETECTORS, OURS
 from tests.stress.boards import Board
 from tests.stress.measures import AMBIGUOUS, OK
@@ -27,6 +28,18 @@ from tests.stress.running import children
 LEAST_SHARE = 0.5  # of a board's corners with which its picture goes into the calibration
 COLUMNS = ["set", "pictures", "found: ours, classic, sector", "corners of ours", "refused by ours, found by OpenCV",
            "pictures all found", "RMS ours", "RMS classic", "RMS sector", "slowest of ours, s"]  # fmt: skip
+HEAD = """\
+# Photographs of chessboards
+
+Public sets of calibration pictures, each from one camera, that are not in this repository; names of pictures are those
+of the sets. OpenCV's own calibration (`calibrateCamera`, `fisheye.calibrate`) is fitted to each detector's corners,
+those that ours calls `ok` in the pictures that all three found; RMS is the residual of a coordinate, px. *classic* is
+`findChessboardCorners` with `cornerSubPix`, *sector* is `findChessboardCornersSB` (exhaustive, accurate). *corners of
+ours*: share of a found board's corners. There is no truth in a photograph; but wrong corners, and corners placed less
+exactly, leave a larger residual. Seconds are processor time.
+
+`python -m tests.stress.photos FOLDER --page docs/evidence/photos.md` writes this page; FOLDER/sets.toml names lens and
+squares of each set. Asked is: no picture refused that OpenCV finds, and the lowest residual in every set."""
 
 
 def main():
@@ -35,18 +48,32 @@ def main():
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", nargs="+", help="sets; all of them without it")
     parser.add_argument("--limit", type=int, default=1000, help="pictures of each set, evenly chosen")
+    parser.add_argument("--page", type=Path, help="file for the table")
     given = parser.parse_args()
-    sets, asked, held = tomllib.loads((given.folder / "sets.toml").read_text()), children(), True
-    print("| " + " | ".join(COLUMNS) + " |\n|" + " --- |" * len(COLUMNS))
+    sets, asked, held = tomllib.loads((given.folder / "sets.toml").read_text()), children(), []
+    lines = ["| " + " | ".join(COLUMNS) + " |", "|" + " --- |" * len(COLUMNS)]
+    print("\n".join(lines))
     try:
         for name in given.only or sets:
             row, holds = _set_row(name, given.folder / name, sets[name], asked, given.limit)
-            print("| " + " | ".join(map(str, row)) + " |", flush=True)
-            held &= holds
+            lines.append("| " + " | ".join(map(str, row)) + " |")
+            print(lines[-1], flush=True)
+            held.append(holds)
+            if given.page:
+                _write(given.page, lines, held)
     finally:
         for child in asked.values():
             child.close()
-    return int(not held)
+    return int(not all(held))
+
+
+def _write(page, lines, held):
+    """The page of the sets that are done."""
+    known = dict(facts())
+    versions = ", ".join(f"{name} {known[name]}" for name in ("python", "numpy", "opencv-python-headless", "numba"))
+    made = f"Made on {known['date']}, on a machine that other work shared: {known['processor']}; {versions}."
+    said = f"{sum(held)} of {len(held)} sets hold everything that is asked."
+    page.write_text("\n\n".join([HEAD, made, said, "\n".join(lines)]) + "\n")
 
 
 def _set_row(name, folder, about, asked, limit):
