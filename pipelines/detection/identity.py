@@ -47,7 +47,8 @@ def _by_circle(seen: list[Placement], flipped: list[Placement]) -> Placement | P
     """Among the placements of the board, and those of its mirror image.
 
     A placement that puts the circle on a square without one is out. Where that leaves none, nor one of the mirror
-    image, the board has no circle.
+    image, the board has no circle. Where the circle is not seen, a mirrored board may look the same: it is out only if
+    the square where it would have its circle is seen to have none.
     """
     shown, shown_flipped = ([p for p in some if p.disc == DISC] for some in (seen, flipped))
     if shown_flipped and not shown:
@@ -56,9 +57,11 @@ def _by_circle(seen: list[Placement], flipped: list[Placement]) -> Placement | P
     if not seen:
         return PointStatus.OTHER_BOARD
     left = shown or [p for p in seen if p.disc != CLEAR]
-    if not left and all(p.disc == CLEAR for p in flipped):
+    is_upright = bool(shown) or all(p.disc == CLEAR for p in flipped)
+    if not left and is_upright:
         left = seen
-    return left[0] if len(left) == 1 and not shown_flipped else PointStatus.ORIENTATION_AMBIGUOUS
+    is_told = len(left) == 1 and is_upright and not shown_flipped
+    return left[0] if is_told else PointStatus.ORIENTATION_AMBIGUOUS
 
 
 def _is_own_mirror_image(target: Chessboard) -> bool:

@@ -29,10 +29,13 @@ def in_view(drawing, margin=4.0):
     return np.all((truth > margin) & (truth < np.array([drawing.width, drawing.height]) - 1.0 - margin), axis=1)
 
 
-@pytest.mark.parametrize("angle", [10.0, 100.0, 190.0, 280.0])
-@pytest.mark.parametrize("shift", [(-9.0, 0.0), (9.0, 1.0), (0.0, -5.8)])
+AWAY = {(-9.0, 0.0): 10.0, (9.0, 1.0): 190.0, (0.0, -5.8): 100.0}  # angle that crops the side with the circle, by shift
+IN_VIEW = [(shift, angle) for shift, away in AWAY.items() for angle in (10.0, 100.0, 190.0, 280.0) if angle != away]
+
+
+@pytest.mark.parametrize(("shift", "angle"), IN_VIEW)
 def test_corners_of_a_cropped_board_keep_their_numbers(shift, angle):
-    """By the circle where it is in view, else by the margin on the sides that are."""
+    """By the circle, or by the place where a mirrored board would have it."""
     drawing = Drawing(shift=shift, angles_deg=(20.0, -15.0, angle), **BASE)
     inside = in_view(drawing)
     assert inside.mean() > 0.4
@@ -41,7 +44,7 @@ def test_corners_of_a_cropped_board_keep_their_numbers(shift, angle):
 
 
 def test_points_of_a_cropped_board_are_ok_and_the_others_are_not_found():
-    drawing = Drawing(shift=(-8.0, 0.0), **BASE)
+    drawing = Drawing(shift=(8.0, 0.0), **BASE)
     found, truth, inside = detect_points(drawing.image(), TARGET), drawing.truth(), in_view(drawing)
     ok = found.status[:-1] == "ok"
     assert np.mean(ok[inside]) > 0.9
@@ -101,6 +104,26 @@ def test_a_mirrored_board_says_so(angle):
 def test_a_mirrored_board_in_part_says_so():
     drawing = Drawing(shift=(8.0, 0.0), **BASE)  # the side away from the circle is cropped
     assert set(detect_points(np.ascontiguousarray(drawing.image()[:, ::-1]), TARGET).status) == {"mirrored"}
+
+
+@pytest.mark.parametrize("is_mirrored", [False, True])
+@pytest.mark.parametrize("shift", AWAY)
+def test_without_the_side_of_the_circle_a_mirrored_board_looks_the_same(shift, is_mirrored):
+    image = Drawing(shift=shift, angles_deg=(20.0, -15.0, AWAY[shift]), **BASE).image()
+    seen = find_board(np.ascontiguousarray(image[:, ::-1]) if is_mirrored else image, TARGET)
+    assert seen == PointStatus.ORIENTATION_AMBIGUOUS
+
+
+@pytest.mark.parametrize(("grey", "radius"), [(120, 20), (20, 20), (120, 40)])
+def test_a_covered_circle_is_told_by_the_square_that_has_none(grey, radius):
+    """A board whose circle is covered has none where a mirrored board would have it; a mirrored one is never ok."""
+    drawing = Drawing(angles_deg=(15.0, -10.0, 0.0), **BASE)
+    image, truth = drawing.image(), drawing.truth()
+    x, y = (int(v) for v in np.rint(truth[-1]))
+    cv2.circle(image, (x, y), radius, grey, -1)
+    numbered(image, TARGET, truth)
+    mirrored = find_board(np.ascontiguousarray(image[:, ::-1]), TARGET)
+    assert mirrored in (PointStatus.MIRRORED, PointStatus.ORIENTATION_AMBIGUOUS)
 
 
 def test_a_board_that_is_its_own_mirror_image_is_no_mirrored_one():
