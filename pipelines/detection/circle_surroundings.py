@@ -8,12 +8,12 @@ from eposit.arrays import Array
 from pipelines.detection.board_map import BoardMap
 from render.targets.chessboard import Chessboard
 
-MARGIN_PX = 2.5  # kept clear around the circle and its shade: three times a sharp picture's blur
+MARGIN_PX, MARGIN_BLURS = 2.5, 2.5  # kept clear around the circle and its shade: px, or blurs if they are more
 FARTHEST_PARALLAX = 3.0  # heights of the circle: a larger one is an ambiguous map's invention
 SMALL_PARALLAX = 0.3  # squares: up to here the circle may be displaced either way, which a small tilt leaves open
 
 
-def ellipses_around_circle(board: BoardMap, target: Chessboard) -> tuple[Array, Array]:
+def ellipses_around_circle(board: BoardMap, target: Chessboard, blur_px: float) -> tuple[Array, Array]:
     """Ellipses of one form: at the circle's foot, and where its height may displace it.
 
     Returns their centres (k, 2) px, k from 1 to 3, and the map (2, 2) from px to the unit circle of such an ellipse.
@@ -24,5 +24,8 @@ def ellipses_around_circle(board: BoardMap, target: Chessboard) -> tuple[Array, 
     parallax = board(foot, height) - base
     squares = float(np.linalg.norm(inverse @ parallax))
     ways = [0.0] if squares > FARTHEST_PARALLAX * height else [0.0, 1.0, -1.0][: 3 if squares <= SMALL_PARALLAX else 2]
-    radius = target.circle_radius_mm / target.square_mm + MARGIN_PX * np.linalg.norm(inverse, axis=1).max()
+    radius = (
+        target.circle_radius_mm / target.square_mm
+        + max(MARGIN_PX, MARGIN_BLURS * blur_px) * np.linalg.norm(inverse, axis=1).max()
+    )
     return base + np.array(ways)[:, None] * parallax, inverse / radius

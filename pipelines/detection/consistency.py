@@ -56,8 +56,8 @@ def _agreeing(corners: Corners, at: Array, size: tuple[int, int]) -> Corners:
             return replace(corners, consistent=np.zeros(len(at), bool))
         weights = _weights(corners.covariance_px2, good)
         board = BoardMap.fit(at, points, size, weights, board)
-        distance = _left_out(points, board, at, weights)
-        excess = np.where(good, distance / _limits(side, float(np.median(distance[good]))), 0.0)
+        distance, spread = _left_out(points, board, at, weights)
+        excess = np.where(good, distance / _limits(side, float(np.median(distance[good])) * spread, spread), 0.0)
         worst = int(np.argmax(excess))
         if excess[worst] <= 1.0:
             break
@@ -65,9 +65,12 @@ def _agreeing(corners: Corners, at: Array, size: tuple[int, int]) -> Corners:
     return replace(corners, consistent=good, board=board)
 
 
-def _limits(side: Array, typical: float) -> Array:
-    """(n,) largest distances from the map, px. side: (n,) of the local squares, px. typical: median distance, px."""
-    usual = np.minimum(np.maximum(LIMIT_PX, LIMIT_SHARE * side), max(SHARP_SPREADS * typical, SHARP_PX))
+def _limits(side: Array, typical: Array, spread: Array) -> Array:
+    """(n,) largest distances from the map through the others, px.
+
+    side: (n,) of the local squares, px. typical: (n,) median distance times `spread`, px. spread: see `_left_out`.
+    """
+    usual = np.minimum(np.maximum(LIMIT_PX, LIMIT_SHARE * side), np.maximum(SHARP_SPREADS * typical, SHARP_PX * spread))
     return np.maximum(usual, np.minimum(LIMIT_SPREADS * typical, MOST_SHARE * side))
 
 
@@ -97,9 +100,13 @@ def _weights(covariance: Array, good: Mask) -> Array:
     return np.median(variance[good]) / variance
 
 
-def _left_out(points: Array, board: BoardMap, at: Array, weights: Array) -> Array:
-    """(n,) distance of each corner from the map fitted to the others, px."""
+def _left_out(points: Array, board: BoardMap, at: Array, weights: Array) -> tuple[Array, Array]:
+    """(n,) distance of each corner from the map fitted to the others, px, and by what factor it scatters more.
+
+    Where the others hardly tell the map, as beside the board's own corners, a small error of theirs moves it far.
+    """
     slopes = board.slopes(at)
     scaled = (slopes * np.sqrt(weights)[:, None, None]).reshape(-1, slopes.shape[-1])
     own = leverage(scaled).reshape(-1, 2).max(axis=1)
-    return np.linalg.norm(points - board(at), axis=1) / np.maximum(1.0 - own, 1e-3)
+    left = np.maximum(1.0 - own, 1e-3)
+    return np.linalg.norm(points - board(at), axis=1) / left, 1.0 / np.sqrt(left)

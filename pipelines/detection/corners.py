@@ -16,6 +16,7 @@ from pipelines.detection.corner_model import fit_corners
 from pipelines.detection.corner_picture import BLUR, CONTRAST, MEAN, SHAPE, SLOPE, CornerTask
 from pipelines.detection.corner_sites import CornerSites
 from pipelines.detection.finders import Grey
+from pipelines.detection.hot_pixels import without_hot_pixels
 from pipelines.detection.tone_curve import Light, decoded, measured_exponent
 
 STOP = 0.5  # step, in standard deviations, at which a fit has converged; it is still made
@@ -48,7 +49,9 @@ FINAL = _Pass(steps=40, must_converge=True, reach=1.0)
 
 def refine_corners(image: Grey, board: BoardMap, sites: CornerSites) -> Corners:
     """Fit every corner near where `board` puts it, clear of the circle: once near by, then over all of its edges."""
-    at, size, light = sites.at, (image.shape[1], image.shape[0]), decoded(image, 1.0)
+    at, size = sites.at, (image.shape[1], image.shape[0])
+    image = without_hot_pixels(image, board(at), float(np.abs(board.jacobian(at)).max()))
+    light = decoded(image, 1.0)
     corners, shapes = _fit(light, board, sites, _start_shapes(board, at, measured_blur(light, board, sites)), NEAR)
     exponent = 0.0
     for _ in range(2 if len(at) < FEW else 1):
@@ -144,8 +147,8 @@ def _task(board: BoardMap, jacobian: Array, sites: CornerSites, shapes: Array, r
     """Where each corner is looked for, and in which pixels: up to the next edges, and not beside the circle."""
     at = sites.at
     lengths = np.linalg.norm(jacobian, axis=1)
-    discs, disc_axes = _covered(board, sites)
     blur = shapes[:, BLUR]
+    discs, disc_axes = _covered(board, sites, float(np.median(blur)))
     blurs = CLEAR_BLURS * blur[:, None] / lengths
     if reach > 0.0:
         windows = np.clip(min(sites.reach, reach) * lengths.max(axis=1), FINAL_PX, FARTHEST_PX)
@@ -177,8 +180,8 @@ def _is_corner(fitted: Array, covariance: Array, starts: Array, jacobian: Array,
         return good & np.all(np.isfinite(covariance), axis=(1, 2)) & (np.linalg.det(covariance) > 0.0)
 
 
-def _covered(board: BoardMap, sites: CornerSites) -> tuple[Array, Array]:
+def _covered(board: BoardMap, sites: CornerSites, blur_px: float) -> tuple[Array, Array]:
     """Ellipses (k, 2) px that no fit may use, and the map (2, 2) from px to the unit circle of one."""
     if sites.circled is None:
         return np.empty((0, 2)), np.eye(2)
-    return ellipses_around_circle(board, sites.circled)
+    return ellipses_around_circle(board, sites.circled, blur_px)

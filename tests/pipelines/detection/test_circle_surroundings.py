@@ -31,7 +31,7 @@ def test_what_is_left_out_around_a_raised_circle(height_mm, tilt_deg, ways):
     target = Chessboard(circle_height_mm=height_mm)
     board = camera_above(tilt_deg, target)
     foot, height = target.circle_centre[:2] / target.square_mm, height_mm / target.square_mm
-    centres, to_unit_circle = ellipses_around_circle(board, target)
+    centres, to_unit_circle = ellipses_around_circle(board, target, 0.8)
     displaced = board(foot, height) - board(foot)
     assert np.linalg.norm(displaced) > 0.5  # px: else the places could not be told apart
     np.testing.assert_allclose(centres, board(foot) + np.array(ways)[:, None] * displaced, atol=1e-9)
