@@ -10,11 +10,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipelines.detection.circle_model import SHAPE, DiscFit, Patch, Prior, cost_of, fit_disc, shadow_of
+from eposit.arrays import Array
+from pipelines.detection.circle_model import SHADOW, SHAPE, DiscFit, Patch, Prior, cost_of, fit_disc, shadow_of
 
 Rings = tuple[tuple[float, int], ...]
 
 # Rings of shadows: heights by which they are displaced, and how many there are. Few tell whether one lamp is enough.
+STARTS = ((0.0, 1), (1.0, 6))  # where the one shadow is looked for first
 FEW, FEW_SOFTNESS = ((0.5, 6), (1.2, 8), (2.4, 8)), 0.3
 MANY, MANY_SOFTNESS = ((0.4, 6), (0.8, 8), (1.2, 10), (1.8, 12), (2.6, 12)), 0.2
 SPREAD = 0.1  # of the contrast: light that may come from each direction beyond that of lamp and surroundings
@@ -29,7 +31,7 @@ def fit_in_any_light(patch: Patch, known: Prior, height: float, contrast: float)
 
     height: of the circle above the board, radii. contrast: grey values.
     """
-    plain = fit_disc(patch, known)
+    plain = fit_disc(patch, replace(known, start=_best_start(patch, known, height)))
     left = cost_of(*_lit(patch, known, FEW, FEW_SOFTNESS, height, contrast), plain.values[:SHAPE])
     if plain.residual <= MISSING * left / len(patch.grey):
         return plain
@@ -37,12 +39,26 @@ def fit_in_any_light(patch: Patch, known: Prior, height: float, contrast: float)
     return replace(fit, covariance=fit.covariance * LEFT_OUT**2) if fit.converged else plain
 
 
+def _best_start(patch: Patch, known: Prior, height: float) -> Array:
+    """The start with the shadow in the place that fits best: from a wrong one it may stay where none can be seen."""
+    starts = [known.start]
+    for place in _places(STARTS, height):
+        starts.append(known.start.copy())
+        starts[-1][SHADOW] = place
+    return min(starts, key=lambda start: cost_of(patch, known, start))
+
+
+def _places(rings: Rings, height: float) -> list[tuple[float, float]]:
+    """Places of shadows, radii from the disc's foot."""
+    turns = [(ring * height, 2.0 * np.pi * k / count) for ring, count in rings for k in range(count)]
+    return [(far * float(np.cos(turn)), far * float(np.sin(turn))) for far, turn in turns]
+
+
 def _lit(
     patch: Patch, known: Prior, rings: Rings, softness: float, height: float, contrast: float
 ) -> tuple[Patch, Prior]:
     """The patch and what is known of it with the shadows of lamps all around."""
-    turns = [(ring * height, 2.0 * np.pi * k / count) for ring, count in rings for k in range(count)]
-    places = [(far * float(np.cos(turn)), far * float(np.sin(turn))) for far, turn in turns]
+    places = _places(rings, height)
     shadows = np.array([shadow_of(patch.on_board, place, softness * height) for place in places])
     mean, spread = np.zeros(len(places)), np.full(len(places), SPREAD * contrast)
     return (
