@@ -108,7 +108,12 @@ def _is_text(value: object) -> bool:
 
 def _is_real(value: object) -> bool:
     """Whether a value is one real number, of whatever package, that float64 can hold."""
-    return isinstance(value, numbers.Real) and bool(value <= MOST and -value <= MOST)  # whole numbers of any length
+    if not isinstance(value, numbers.Real):
+        return False
+    try:
+        return abs(float(value)) <= MOST
+    except OverflowError:
+        return False  # a whole number of hundreds of digits
 
 
 def _seen_angle(side: Array, z: Array) -> Array:
