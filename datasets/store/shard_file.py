@@ -20,6 +20,7 @@ import pyarrow.parquet as pq
 from datasets.schema import KEYS, LATER_COLUMNS, NAN_VERSION, READABLE, SCORES_ADDED, TABLES, meanings
 from datasets.store.digest import column_digest, text_digest
 from datasets.store.nulls import is_list_of_floats
+from datasets.store.parquet_footer import stored_columns
 from datasets.store.texts import longest
 
 RECIPE_KEY, VERSION_KEY, DIGEST_KEY = b"recipe", b"schema_version", b"content"
@@ -32,7 +33,7 @@ MOST_EXPANSION = 20  # bytes of columns that one byte of a file may hold; pictur
 MOST_TEXT_BYTES = 4000
 MOST_REPEATED = 10**9  # bytes of pictures that are stored once for several rows
 # Others, as DELTA_BYTE_ARRAY, hold far more than their size.
-ENCODINGS = frozenset({"PLAIN", "RLE", "BIT_PACKED", "RLE_DICTIONARY", "PLAIN_DICTIONARY"})
+ENCODINGS = frozenset({0, 2, 3, 4, 8})  # plain, plain dictionary, RLE, bit packed, RLE dictionary: see `parquet_footer`
 Footer = dict[bytes, bytes]
 # What Arrow raises of files that are damaged or no Parquet, from where it notices.
 UNREADABLE = (OSError, ValueError, LookupError, ArithmeticError, MemoryError, TypeError, pa.ArrowException)
@@ -116,14 +117,12 @@ def _check_size(path: Path, metadata: Any, most_rows: int | None) -> None:
     if most_rows is not None and metadata.num_rows > max(most_rows, SMALL_ROWS):
         raise DamagedShardError(f"it has {metadata.num_rows} rows, and {most_rows} are planned")
     unpacked = repeated = 0
-    for group in range(metadata.num_row_groups):
-        for number in range(metadata.num_columns):
-            column = metadata.row_group(group).column(number)
-            unpacked += column.total_uncompressed_size
-            if not set(column.encodings) <= ENCODINGS:
-                raise DamagedShardError(f"its {column.path_in_schema} is stored as this program never does")
-            if column.path_in_schema == "image.bytes" and column.has_dictionary_page:  # as earlier versions did
-                repeated = max(repeated, column.num_values * column.total_uncompressed_size)
+    for column in stored_columns(path):
+        unpacked += column.uncompressed_bytes
+        if not column.encodings <= ENCODINGS:
+            raise DamagedShardError(f"its {column.name} is stored as this program never does")
+        if column.name == "image.bytes" and column.has_dictionary:  # as earlier versions did
+            repeated = max(repeated, column.values * column.uncompressed_bytes)
     if repeated > MOST_REPEATED:
         raise DamagedShardError("its pictures may unpack to more than memory can hold")
     if unpacked > MOST_EXPANSION * path.stat().st_size + SMALL_BYTES:
