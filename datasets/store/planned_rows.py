@@ -16,6 +16,7 @@ from datasets.store.images import NO_PNG, decode_pixels, png_size
 from datasets.store.nulls import with_nans
 from eposit.arrays import Array
 from eposit.calibrated_lens import MOST_COEFFICIENTS
+from render.motion import image_points
 
 TOLERANCE = 1e-6  # relative, and absolute below 1: far above rounding, far below any error that is looked for
 SAME = ("frame_id", "pose_id", "render_seed", "sensor_seed")  # columns that are a frame's own values
@@ -72,7 +73,7 @@ def _fault_of_sizes(frames: Sequence[Frame], rows: pa.Table) -> str | None:
 
 def _fault_of_keypoints(recipe: Recipe, index: int, rows: pa.Table) -> str | None:
     frames, points = frames_of_shard(recipe, index), recipe.target.points
-    images = np.concatenate([frame.camera.true_camera().project(frame.cam_from_obj.apply(points)) for frame in frames])
+    images = np.concatenate([image_points(frame.camera.true_camera(), frame.cam_from_obj, points) for frame in frames])
     wanted = {"x_px": images[:, 0], "y_px": images[:, 1]}
     wanted |= {f"{axis}_obj_mm": np.tile(points[:, i], len(frames)) for i, axis in enumerate("xyz")}
     return _told([*_far(rows, wanted)])

@@ -16,11 +16,12 @@ from pipelines.detection.circle_model import SHADOW, SHAPE, DiscFit, Patch, Prio
 Rings = tuple[tuple[float, int], ...]
 
 # Rings of shadows: heights by which they are displaced, and how many there are. Few tell whether one lamp is enough.
-STARTS = ((0.0, 1), (1.0, 6))  # where the one shadow is looked for first
+STARTS = ((0.0, 1), (1.0, 6))  # where the one shadow is looked for if it seems to be in a wrong place
 FEW, FEW_SOFTNESS = ((0.5, 6), (1.2, 8), (2.4, 8)), 0.3
 MANY, MANY_SOFTNESS = ((0.4, 6), (0.8, 8), (1.2, 10), (1.8, 12), (2.6, 12)), 0.2
 SPREAD = 0.1  # of the contrast: light that may come from each direction beyond that of lamp and surroundings
-MISSING = 1.3  # times as much as is left of the residuals with further shadows: then one lamp does not explain them
+DOUBTFUL = 1.1  # times as much as is left of the residuals with further shadows: the one may be in a wrong place
+MISSING = 1.3  # likewise: one lamp does not explain them
 LEFT_OUT = 1.5  # times the stated error of a fit with many shadows: a lamp may stand between two directions
 
 
@@ -31,12 +32,22 @@ def fit_in_any_light(patch: Patch, known: Prior, height: float, contrast: float)
 
     height: of the circle above the board, radii. contrast: grey values.
     """
-    plain = fit_disc(patch, replace(known, start=_best_start(patch, known, height)))
-    left = cost_of(*_lit(patch, known, FEW, FEW_SOFTNESS, height, contrast), plain.values[:SHAPE])
-    if plain.residual <= MISSING * left / len(patch.grey):
+    plain = fit_disc(patch, known)
+    unexplained = _unexplained(plain, patch, known, height, contrast)
+    if unexplained > DOUBTFUL:
+        again = fit_disc(patch, replace(known, start=_best_start(patch, known, height)))
+        if again.converged and again.residual < plain.residual:
+            plain, unexplained = again, _unexplained(again, patch, known, height, contrast)
+    if unexplained <= MISSING:
         return plain
     fit = fit_disc(*_lit(patch, known, MANY, MANY_SOFTNESS, height, contrast))
     return replace(fit, covariance=fit.covariance * LEFT_OUT**2) if fit.converged else plain
+
+
+def _unexplained(fit: DiscFit, patch: Patch, known: Prior, height: float, contrast: float) -> float:
+    """How many times its residuals are those that further shadows would leave, the disc staying where it is."""
+    left = cost_of(*_lit(patch, known, FEW, FEW_SOFTNESS, height, contrast), fit.values[:SHAPE])
+    return fit.residual * len(patch.grey) / max(left, 1e-12)
 
 
 def _best_start(patch: Patch, known: Prior, height: float) -> Array:

@@ -11,13 +11,14 @@ import pytest
 from datasets.errors import UserError
 from datasets.store.dataset import open_dataset
 from datasets.store.images import decode_png, encode_png
+from datasets.store.known_shards import KNOWN_FILE
 from pipelines.detection import Detector
 from pipelines.stages.repair import answers_of
 from pipelines.stages.settings import RUN_SETTINGS, Setting, System
 from tests.tables import OF_A_RUN
 from tests.wrong_input import assert_one_sentence, files, first
 
-DERIVED = ("manifest.json", "README.md")
+DERIVED = ("manifest.json", "README.md", KNOWN_FILE)
 
 
 def made(root):
