@@ -110,6 +110,7 @@ def test_papers_simulation(centre):
     assert np.mean(ratio >= 2.0) <= 0.07
 
 
+@pytest.mark.full
 def test_more_points_are_used():
     """Ten points have 13 degrees of freedom to spare, four have one: the error falls several times."""
     rng, four, ten = np.random.default_rng(44), [], []

@@ -63,7 +63,7 @@ def noisy_image(seed, sigma_px=2.0, n=5):
     return points, pixels, rays[:, :2] / rays[:, 2:]
 
 
-@pytest.mark.parametrize(("n", "count"), [(4, 1000), (6, 200), (10, 200)])
+@pytest.mark.parametrize(("n", "count"), [pytest.param(4, 1000, marks=pytest.mark.full), (6, 200), (10, 200)])
 def test_exact_points_give_the_exact_pose_and_forty_pairs(n, count):
     rng, excluded = np.random.default_rng(n), 0
     for _ in range(count // 10):

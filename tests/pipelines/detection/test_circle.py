@@ -174,7 +174,7 @@ def test_noise_moves_it_as_far_as_it_states(drawn, name):
 def test_the_light_of_several_lamps_is_in_what_it_states(name):
     image, camera = board_with(name, lamps=LAMPS)
     truth, rng, normalised = project(camera, AT[None], HEIGHT)[0], np.random.default_rng(4), []
-    for _ in range(10):
+    for _ in range(5):
         circle = found_in(digitised(image, rng, 1.0), camera)
         normalised.append(np.linalg.cholesky(np.linalg.inv(circle.covariance_px2)).T @ (circle.centre_px - truth))
     print(

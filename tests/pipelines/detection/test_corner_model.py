@@ -39,6 +39,7 @@ SCENES = {
     "heavy blur": {"angles": degrees(17, 90), "blur": 2.5},
     "everything": {"angles": degrees(23, 50), "bends": (0.003, 0.004), "light": (0.004, 0.003), "blur": 1.2},
 }
+IN_TIERS = [pytest.param(name, marks=pytest.mark.full) if "degrees" in name else name for name in SCENES]
 # Rounded to 8 bits, nothing else: measured 0.0007 px RMS and 0.002 at worst. An edge along the pixels is rounded alike
 # all along it; the fit knows a corner of heavy blur, or of skew, two to three times less well: measured 0.008 at worst.
 CLEAN_PX = {
@@ -113,7 +114,7 @@ def whitened(error, covariance):
     return (np.linalg.cholesky(np.linalg.inv(covariance)).transpose(0, 2, 1) @ error[..., None])[..., 0]
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", IN_TIERS)
 def test_a_corner_is_found_with_the_covariance_it_states(name):
     scene, rng = SCENES[name], np.random.default_rng(1)
     corners = rng.uniform(-0.5, 0.5, (20, 2))

@@ -141,6 +141,7 @@ def _shows_the_worst_frames(nights, row, cli):
         assert (done.code, told in done.err) == (2, True)
 
 
+@pytest.mark.full
 def test_a_waiver_counts_until_its_day_has_passed(night, monkeypatch, nights):
     _plant(monkeypatch, 0.002)
     _, row = night(*QUICK)
