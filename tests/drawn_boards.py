@@ -26,6 +26,7 @@ class Drawing:
     circle_height: float = 0.1
     white: float = 200.0
     black: float = 20.0
+    exchanged: bool = False  # squares that are black elsewhere are white, and white ones black
     lens: str = "fisheye"  # equidistant, or "pinhole"
     focal_px: float = 300.0
     width: int = 640
@@ -94,7 +95,7 @@ class Drawing:
         bx, by, front = meets(0.0)
         column, row = np.floor(bx) + 1, np.floor(by) + 1
         inside = (column >= 0) & (column < self.columns) & (row >= 0) & (row < self.rows)
-        black = inside & ((column + row) % 2 == 0)
+        black = inside & ((column + row) % 2 == int(self.exchanged))
         m = 1.0 + self.margin
         board = (bx > -m) & (bx < self.columns - 2 + m) & (by > -m) & (by < self.rows - 2 + m)
         out = np.where(front & board, np.where(black, self.black, self.white), BEHIND)

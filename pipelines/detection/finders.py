@@ -36,7 +36,7 @@ def find_board(image: Grey, target: AnyChessboard) -> SeenPoints | PointStatus:
     if lattice.status != PointStatus.OK:
         return lattice.status
     points = centred(image, lattice.points_px, lattice.side_px)
-    return SeenPoints(lattice.ids, points, LATTICE)
+    return SeenPoints(lattice.ids, points, LATTICE, lattice.exchanged)
 
 
 def find_sector_based(image: Grey, target: AnyChessboard) -> SeenPoints | PointStatus:

@@ -25,6 +25,7 @@ class Placement(NamedTuple):
     turn: NDArray[np.int64]  # (2, 2)
     offset: NDArray[np.int64]  # (2,)
     disc: int  # what the square holds where the circle would be: DISC, CLEAR or UNKNOWN
+    exchanged: bool = False  # whether the board's black squares are white in the picture, and its white ones black
 
 
 def identify(
@@ -37,7 +38,7 @@ def identify(
     """
     seen = [p for turn in TURNS for p in _placements(turn, shape, white_first, look, target)]
     if isinstance(target, PlainChessboard):
-        return _by_squares(seen, target, axes_px)
+        return _by_squares(seen or _exchanged(shape, white_first, look, target), target, axes_px)
     turns = () if _is_own_mirror_image(target) else TURNS
     flipped = [p for turn in turns for p in _placements(turn @ MIRROR, shape, white_first, look, target)]
     return _by_circle(seen, flipped)
@@ -69,6 +70,18 @@ def _is_own_mirror_image(target: Chessboard) -> bool:
     middle = np.array(target.circle_square) - (np.array((target.columns, target.rows)) + 1) / 2.0
     kept = (turn @ MIRROR for turn in TURNS if turn[0, 0] != 0 or target.columns == target.rows)
     return any(np.array_equal(mirror @ middle, middle) for mirror in kept)
+
+
+def _exchanged(shape: tuple[int, int], white_first: bool, look: Look, target: PlainChessboard) -> list[Placement]:
+    """Placements with white on black, of a lattice that is the whole board.
+
+    Boards of even by even and of odd by odd squares are printed in two ways, with a black or with a white first square;
+    their corners lie in the same places. A part of a board is not read so: it would fit at twice as many places.
+    """
+    if sorted(shape) != sorted(target.inner):
+        return []
+    found = [p for turn in TURNS for p in _placements(turn, shape, not white_first, look, target)]
+    return [p._replace(exchanged=True) for p in found]
 
 
 def _by_squares(seen: list[Placement], target: PlainChessboard, axes_px: Array) -> Placement | PointStatus:

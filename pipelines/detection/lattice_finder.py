@@ -51,6 +51,7 @@ class SeenLattice:
     points_px: Array  # (k, 2) px of the picture
     count: int  # of the lattice's points
     side_px: float  # of its squares, px of the picture
+    exchanged: bool = False  # whether black is white in the picture, and white black
 
     def is_better_than(self, other: SeenLattice | None) -> bool:
         """Whether it tells more."""
@@ -122,7 +123,7 @@ def _told(level: LevelOf, smoothed: Level, grid: Grid, target: AnyChessboard) ->
     corners = _on_board(smoothed, firm, board, told, target)
     ids = np.flatnonzero(corners.known)
     points = level.in_picture(corners.points.reshape(-1, 2)[ids])
-    return SeenLattice(PointStatus.OK, ids, points, len(ids), level.scale * side)
+    return SeenLattice(PointStatus.OK, ids, points, len(ids), level.scale * side, told.exchanged)
 
 
 def _firm_part(smoothed: Level, grid: Grid) -> Grid:

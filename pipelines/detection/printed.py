@@ -57,6 +57,8 @@ def place_points(image: Grey, seen: SeenPoints, target: PrintedBoard) -> Corners
     if isinstance(target, CircleGrid):
         return refine_circles(image, board, target, unit)
     sites = corner_sites(target)
+    if seen.exchanged:
+        sites = replace(sites, sense=-sites.sense)
     inside = _is_inside(board(at), size)
     read = np.zeros(len(at), bool)
     read[seen.ids] = True

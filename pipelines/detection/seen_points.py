@@ -17,3 +17,4 @@ class SeenPoints:
     ids: NDArray[np.integer]  # (k,) rows in the target's `points`, each once
     points_px: Array  # (k, 2)
     finder: str  # which finder saw them
+    exchanged: bool = False  # whether black is white in the picture, and white black

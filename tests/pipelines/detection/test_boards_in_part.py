@@ -156,6 +156,24 @@ def test_a_plain_board_that_looks_the_same_after_half_a_turn_is_read_upright(col
     assert len(ids) == (columns - 1) * (rows - 1)
 
 
+@pytest.mark.parametrize(("columns", "rows"), [(8, 6), (9, 7)])
+@pytest.mark.parametrize("angle", [30.0, 210.0])
+def test_a_plain_board_with_a_white_first_square_is_found(columns, rows, angle):
+    """Half a turn changes nothing in its picture, so that it is read upright, as other boards of that kind are."""
+    drawing = Drawing(columns=columns, rows=rows, circle=None, exchanged=True, angles_deg=(20.0, -15.0, angle), **BASE)
+    found = detect_points(drawing.image(), PlainChessboard(columns=columns, rows=rows))
+    truth = drawing.truth() if angle < 90.0 else drawing.truth()[::-1]
+    assert set(found.status) == {"ok"}
+    # Two cells to a pixel put an edge off by up to a quarter of a pixel, here and there; another corner is 25 px away.
+    assert np.linalg.norm(found.points_px - truth, axis=1).max() < 0.3
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(8, 6), (9, 7)])
+def test_of_a_board_with_a_circle_the_first_square_is_black(columns, rows):
+    drawing = Drawing(columns=columns, rows=rows, circle=None, exchanged=True, **BASE)
+    assert set(detect_points(drawing.image(), Chessboard(columns=columns, rows=rows)).status) == {"other_board"}
+
+
 def test_a_plain_board_in_part_is_told_by_its_margin():
     drawing = Drawing(shift=(8.0, 0.5), circle=None, **BASE)
     numbered(drawing.image(), PLAIN, drawing.truth())
