@@ -28,7 +28,7 @@ class Reading:
 
     measures: pa.Table
     replayed: dict[str, str]  # setting to the digest of its poses
-    left_out: tuple[str, ...] = ()  # a sentence for each file of poses that lacks some frames
+    left_out: tuple[str, ...] = ()  # a sentence for each file of poses that lacks frames or seems to have another form
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,9 +92,10 @@ def _import(dataset: Dataset, files: Sequence[PoseFile]) -> tuple[str, ...]:
     told: list[str] = []
     for item in files:
         path = item.path(regime_of(dataset.recipe.sensor) or "")
-        missing = import_poses(dataset, path, item.system)
-        if missing:
-            told.append(f"{path} has no pose for {missing} of {frames} frames, which count as failures")
+        imported = import_poses(dataset, path, item.system)
+        told += [imported.warning] if imported.warning else []
+        if imported.missing:
+            told.append(f"{path} has no pose for {imported.missing} of {frames} frames, which count as failures")
     return tuple(told)
 
 

@@ -6,6 +6,7 @@ import csv
 import itertools
 import re
 from collections.abc import Callable, Collection
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ import pyarrow.parquet as pq
 
 from datasets.errors import UserError
 from datasets.plan import shard_count
-from datasets.rows import POSITION_COLUMNS, QUATERNION_COLUMNS
+from datasets.rows import POSITION_COLUMNS, QUATERNION_COLUMNS, poses
 from datasets.store.dataset import Dataset
 from datasets.store.digest import table_digest
 from eposit import Pose, Status
@@ -25,6 +26,7 @@ from pipelines.adapters.results import MOST_LETTERS, PoseResult, pose_result
 from pipelines.stages import score
 from pipelines.stages.estimate import path_of_shard
 from pipelines.stages.estimate_images import system_rows
+from pipelines.stages.pose_conventions import ConventionErrors
 from pipelines.stages.settings import System
 
 FRAME = "frame_id"
@@ -38,27 +40,36 @@ MOST_ROWS, MOST_BYTES = 2_000_000, 1_000_000_000  # of a file of poses
 TOLERANCE = 1e-3  # of a quaternion's length and of R^T R - 1: three decimals
 
 
-def import_poses(dataset: Dataset, path: Path, system: System) -> int:
-    """Write a file's poses as the estimates of a system, and forget its old scores where they differ.
+@dataclass(frozen=True, slots=True)
+class Imported:
+    """What is to be told of a file of poses that was taken as it is."""
 
-    Returns:
-        How many frames the file has no pose for: their status is missing.
+    missing: int  # frames that the file has no pose for: their status is missing
+    warning: str | None  # names the unit or the direction that the poses seem to have instead of ours
+
+
+def import_poses(dataset: Dataset, path: Path, system: System) -> Imported:
+    """Write a file's poses as the estimates of a system, and forget its old scores where they differ.
 
     Raises:
         UserError: a name that is not usable, a file that cannot be read, or poses that are wrong.
     """
     known = dataset.read("frames", [FRAME])[FRAME].to_pylist()
     answers = poses_of(path, system, known, str(dataset.root))
-    count = shard_count(dataset.recipe)
+    count, conventions = shard_count(dataset.recipe), ConventionErrors()
     for index in range(count):
-        ids = dataset.read_shard(dataset.shard_path("frames", index, count), [FRAME])[FRAME].to_pylist()
+        frames = dataset.read_shard(
+            dataset.shard_path("frames", index, count), [FRAME, *QUATERNION_COLUMNS, *POSITION_COLUMNS]
+        )
+        ids = frames[FRAME].to_pylist()
+        conventions.add(ids, poses(frames), answers)
         rows = system_rows(ids, system, [answers.get(frame, PoseResult(Status.MISSING)) for frame in ids])
         shard = path_of_shard(dataset, index, system.shard_name)
         if not (dataset.is_done(shard) and table_digest(dataset.read_shard(shard)) == table_digest(rows)):
             score.forget(dataset, shard)
             dataset.write_shard(shard, rows)
     dataset.write_manifest()
-    return len(set(known) - set(answers))
+    return Imported(len(set(known) - set(answers)), conventions.warning(path))
 
 
 def poses_of(path: Path, system: System, known: Collection[int], where: str) -> dict[int, PoseResult]:

@@ -13,6 +13,7 @@ from eposit import Status
 from pipelines.adapters.process import end_function_process
 from pipelines.detection import Detector
 from pipelines.detection.prepare import Kernels
+from pipelines.endings import printable
 from pipelines.stages import bound, detect, estimate, generate, score
 from pipelines.stages import estimate_images as systems
 from pipelines.stages.import_poses import import_poses
@@ -90,14 +91,16 @@ def run_bound(dataset: Dataset, execution: Execution) -> None:
 
 
 def run_import(dataset: Dataset, path: Path, system: System, execution: Execution) -> None:
-    """Take another system's poses from a file, and tell how many frames it left out.
+    """Take another system's poses from a file; tell how many frames it left out, and a likely mistake in their form.
 
     Raises:
         UserError: a name, file or pose that is not usable.
     """
-    missing = import_poses(dataset, path, system)
-    if missing:
-        text = f"{path} has no pose for {missing} of {frame_count(dataset.recipe)} frames; they count as failures"
+    told = import_poses(dataset, path, system)
+    if told.warning:
+        print(printable(f"warning: {told.warning}"), file=sys.stderr)
+    if told.missing:
+        text = f"{path} has no pose for {told.missing} of {frame_count(dataset.recipe)} frames; they count as failures"
         execution.console.print(text, soft_wrap=True)
 
 

@@ -158,6 +158,18 @@ def test_rounded_poses_are_taken(decimals, poses, root, tmp_path, cli):
     assert all(abs(row["rotation_error_deg"] - 0.1) < limit for row in made(root, "scores"))
 
 
+@pytest.mark.parametrize("quiet", [(), ("-q",)])
+def test_positions_in_metres_are_told_and_scored_as_they_are(quiet, poses, root, tmp_path, cli):
+    metres = [row | {name: row[name] / 1000.0 for name in T} for row in poses]
+    done = cli("score", root, "--poses", write(tmp_path / "p.csv", metres), "--name", "theirs", *quiet)
+    assert done.code == 0
+    assert done.err.startswith(f"warning: {tmp_path / 'p.csv'} seems to hold positions in metres instead of mm: ")
+    assert done.err.count("\n") == 1
+    assert [[row[name] for name in T] for row in made(root, "estimates")] == [[row[n] for n in T] for row in metres]
+    # Two millimetres instead of two metres.
+    assert all(row["tz_error_mm"] < -500.0 for row in made(root, "scores"))
+
+
 def changed(**values):
     return lambda rows: [rows[0] | values, rows[1]]
 
