@@ -38,7 +38,8 @@ def identify(
     """
     seen = [p for turn in TURNS for p in _placements(turn, shape, white_first, look, target)]
     if isinstance(target, PlainChessboard):
-        return _by_squares(seen or _exchanged(shape, white_first, look, target), target, axes_px)
+        exchanged = _exchanged(shape, white_first, look, target)
+        return _by_squares(seen + exchanged, target, axes_px)
     turns = () if _is_own_mirror_image(target) else TURNS
     flipped = [p for turn in turns for p in _placements(turn @ MIRROR, shape, white_first, look, target)]
     return _by_circle(seen, flipped)
@@ -73,12 +74,11 @@ def _is_own_mirror_image(target: Chessboard) -> bool:
 
 
 def _exchanged(shape: tuple[int, int], white_first: bool, look: Look, target: PlainChessboard) -> list[Placement]:
-    """Placements with white on black, of a lattice that is the whole board.
+    """Placements with white on black, where a print with exchanged colours is another board than the target.
 
-    Boards of even by even and of odd by odd squares are printed in two ways, with a black or with a white first square;
-    their corners lie in the same places. A part of a board is not read so: it would fit at twice as many places.
+    It is the target after half a turn where that changes the colours, and after a quarter where the board is square.
     """
-    if sorted(shape) != sorted(target.inner):
+    if target.tells_orientation or (target.columns == target.rows and target.columns % 2 == 0):
         return []
     found = [p for turn in TURNS for p in _placements(turn, shape, not white_first, look, target)]
     return [p._replace(exchanged=True) for p in found]

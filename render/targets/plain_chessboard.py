@@ -15,8 +15,8 @@ class PlainChessboard(BoardOfSquares):
     """A chessboard; the origin is the first inner corner, and the square at negative x and y is black.
 
     Points: inner corners row by row. A board whose columns and rows are both even or both odd looks the same after half
-    a turn: it is read as standing upright, x to the right in the picture. A print of it with a white first square is
-    found as well where all of it is in view.
+    a turn: it is read as standing upright, x to the right in the picture. Its print with a white first square is
+    found as well.
 
     Raises:
         ValueError: a value out of range.

@@ -13,6 +13,7 @@ from tests.drawn_boards import Drawing
 
 TARGET, PLAIN = Chessboard(), PlainChessboard(margin_mm=100.0)
 BASE = {"width": 480, "height": 360, "focal_px": 260.0, "distance": 9.0, "cells": 2}
+IN_PART = BASE | {"circle": None, "distance": 8.0, "angles_deg": (10.0, -5.0, 5.0)}
 ROUGH_PX = 6.0  # the finder is good to a pixel, or to four beside what crops or covers the board; others are 20 px away
 
 
@@ -166,6 +167,25 @@ def test_a_plain_board_with_a_white_first_square_is_found(columns, rows, angle):
     assert set(found.status) == {"ok"}
     # Two cells to a pixel put an edge off by up to a quarter of a pixel, here and there; another corner is 25 px away.
     assert np.linalg.norm(found.points_px - truth, axis=1).max() < 0.3
+
+
+@pytest.mark.parametrize("exchanged", [False, True])
+@pytest.mark.parametrize(("columns", "rows", "shift"), [(8, 6, (-9.0, 6.0)), (9, 7, (8.0, 0.0))])
+def test_a_part_is_told_by_its_margin_whatever_the_first_square(columns, rows, shift, exchanged):
+    drawing = Drawing(columns=columns, rows=rows, shift=shift, exchanged=exchanged, **IN_PART)
+    found = detect_points(drawing.image(), PlainChessboard(columns=columns, rows=rows, margin_mm=100.0))
+    ok = found.status == "ok"
+    assert 0.5 < ok.mean() < 1.0
+    assert np.linalg.norm((found.points_px - drawing.truth())[ok], axis=1).max() < 0.3
+
+
+@pytest.mark.parametrize("exchanged", [False, True])
+@pytest.mark.parametrize(("columns", "rows"), [(8, 6), (9, 7)])
+def test_colours_alone_do_not_tell_a_part_where_boards_are_printed_in_two_ways(columns, rows, exchanged):
+    """A corner of the board: it is another one if the first square is white."""
+    drawing = Drawing(columns=columns, rows=rows, shift=(10.0, -6.0), exchanged=exchanged, **IN_PART)
+    found = detect_points(drawing.image(), PlainChessboard(columns=columns, rows=rows, margin_mm=100.0))
+    assert set(found.status) == {"orientation_ambiguous"}
 
 
 @pytest.mark.parametrize(("columns", "rows"), [(8, 6), (9, 7)])
