@@ -27,7 +27,7 @@ def moved(true, radians, share):
     return Pose(R, true.t + share * np.linalg.norm(true.t, axis=1, keepdims=True) * rng.standard_normal((COUNT, 3)))
 
 
-def warning_of(found, status=Status.OK, true=None):
+def warning_of(found, status: str = Status.OK, true=None):
     errors = ConventionErrors()
     answers = {i: PoseResult(status, found.R[i], found.t[i]) for i in range(COUNT)}
     for half in (range(COUNT // 2), range(COUNT // 2, COUNT)):
