@@ -53,7 +53,7 @@ def import_poses(dataset: Dataset, path: Path, system: System, pose_format: str 
     """
     known = dataset.read("frames", [FRAME])[FRAME].to_pylist()
     answers = poses_of(path, system, known, str(dataset.root), pose_format)
-    count, conventions = shard_count(dataset.recipe), ConventionErrors()
+    count, conventions = shard_count(dataset.recipe), ConventionErrors(FORMATS[pose_format])
     for index in range(count):
         frames = dataset.read_shard(
             dataset.shard_path("frames", index, count), [FRAME, *QUATERNION_COLUMNS, *POSITION_COLUMNS]
@@ -113,14 +113,15 @@ def read_poses(path: Path, pose_format: str = TABLE) -> dict[int, PoseResult]:
     R = np.stack([numbers[name] for name in rotation], axis=1)
     t = np.stack([numbers[name] for name in position], axis=1)
     statuses = [str(status or "").strip() or Status.OK for status in columns.get("status", [None] * len(frames))]
-    return {
-        frame: (
-            _cam_from_obj(form, _pose(path, frame, R[i], t[i]))
-            if status.lower() == Status.OK
-            else PoseResult(status[:MOST_LETTERS])
-        )
-        for i, (frame, status) in enumerate(zip(frames, statuses, strict=True))
-    }
+    with np.errstate(over="ignore"):  # numbers near the largest float: their squares are refused as infinite
+        return {
+            frame: (
+                _cam_from_obj(form, _pose(path, frame, R[i], t[i]))
+                if status.lower() == Status.OK
+                else PoseResult(status[:MOST_LETTERS])
+            )
+            for i, (frame, status) in enumerate(zip(frames, statuses, strict=True))
+        }
 
 
 def _chosen(path: Path, columns: dict[str, list[Any]], choices: tuple[tuple[str, ...], ...]) -> tuple[str, ...]:
