@@ -87,6 +87,14 @@ PoseFile = Annotated[
     Path | None,
     typer.Option(metavar="FILE", help="Poses of another system, .csv or .parquet, to be scored beside the others."),
 ]
+PoseFormat = Annotated[
+    str,
+    typer.Option(
+        "--pose-format",
+        help="Form of the file of --poses: table (.csv or .parquet with named columns, mm), kitti, tum, colmap, bop or "
+        "euroc, each with the unit and direction of its definition.",
+    ),
+]
 PosesName = Annotated[str | None, typer.Option("--name", help="Name of the poses of --poses in tables and report.")]
 Overwrite = Annotated[
     bool, typer.Option("--overwrite", help="Estimate anew what is there, as your function has changed.")

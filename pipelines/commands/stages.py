@@ -171,6 +171,7 @@ def score(
     folder: o.Folder,
     poses: o.PoseFile = None,
     name: o.PosesName = None,
+    pose_format: o.PoseFormat = "table",
     camera: o.CameraName = "exact",
     workers: o.Workers = 1,
     engine: o.EngineName = "local",
@@ -186,12 +187,14 @@ def score(
         raise UserError("--poses and --name go together; give a file of poses and what to call them, or neither")
     if poses is None and camera != "exact":
         raise UserError("--camera goes with --poses; leave it out, or give a file of poses")
+    if poses is None and pose_format != "table":
+        raise UserError("--pose-format goes with --poses; leave it out, or give a file of poses")
     if poses is not None and shard is not None:
         raise UserError("--poses takes a file as a whole; leave out --shard")
     execution = _execution(engine, workers, ray_address, shard, quiet)
     with writing(folder, shared=not execution.part.is_whole) as dataset:
         if poses is not None and name is not None:
-            stages.run_import(dataset, poses, System(name, camera), execution)
+            stages.run_import(dataset, poses, System(name, camera), execution, pose_format)
         stages.run_score(dataset, execution)
         finish(execution)
 

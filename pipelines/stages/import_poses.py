@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import itertools
 import re
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from datasets.errors import UserError
 from datasets.plan import shard_count
@@ -21,22 +17,22 @@ from datasets.store.dataset import Dataset
 from datasets.store.digest import table_digest
 from eposit import Pose, Status
 from eposit.arrays import Array
+from eposit.pose import rotation_from_vector
 from pipelines.adapters.registry import solver_names
 from pipelines.adapters.results import MOST_LETTERS, PoseResult, pose_result
 from pipelines.stages import score
 from pipelines.stages.estimate import path_of_shard
 from pipelines.stages.estimate_images import system_rows
 from pipelines.stages.pose_conventions import ConventionErrors
+from pipelines.stages.pose_formats import FORMATS, TABLE, PoseFormat
+from pipelines.stages.pose_tables import FRAME, MATRIX, POSITIONS, VECTOR, columns_of
 from pipelines.stages.settings import System
 
-FRAME = "frame_id"
-MATRIX = tuple(f"r{row}{column}" for row in "123" for column in "123")
-POSITIONS = (POSITION_COLUMNS, tuple(f"t{axis}" for axis in "xyz"))
-FORM = "frame_id, q_w q_x q_y q_z or r11 to r33, and t_x_mm t_y_mm t_z_mm or tx ty tz in mm"
+FORM = (
+    "frame_id, q_w q_x q_y q_z or r11 to r33, and t_x_mm t_y_mm t_z_mm or tx ty tz in mm, or rvec and tvec; "
+    "--pose-format reads other programs' files"
+)
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,63}")
-NamesAndColumns = tuple[list[str], list[list[Any]]]
-KNOWN = frozenset({FRAME, "status", *QUATERNION_COLUMNS, *MATRIX, *(name for names in POSITIONS for name in names)})
-MOST_ROWS, MOST_BYTES = 2_000_000, 1_000_000_000  # of a file of poses
 TOLERANCE = 1e-3  # of a quaternion's length and of R^T R - 1: three decimals
 
 
@@ -48,15 +44,16 @@ class Imported:
     warning: str | None  # names the unit or the direction that the poses seem to have instead of ours
 
 
-def import_poses(dataset: Dataset, path: Path, system: System) -> Imported:
+def import_poses(dataset: Dataset, path: Path, system: System, pose_format: str = TABLE) -> Imported:
     """Write a file's poses as the estimates of a system, and forget its old scores where they differ.
 
+    pose_format: of `FORMATS`.
     Raises:
-        UserError: a name that is not usable, a file that cannot be read, or poses that are wrong.
+        UserError: an unknown format, a name that is not usable, a file that cannot be read, or poses that are wrong.
     """
     known = dataset.read("frames", [FRAME])[FRAME].to_pylist()
-    answers = poses_of(path, system, known, str(dataset.root))
-    count, conventions = shard_count(dataset.recipe), ConventionErrors()
+    answers = poses_of(path, system, known, str(dataset.root), pose_format)
+    count, conventions = shard_count(dataset.recipe), ConventionErrors(FORMATS[pose_format])
     for index in range(count):
         frames = dataset.read_shard(
             dataset.shard_path("frames", index, count), [FRAME, *QUATERNION_COLUMNS, *POSITION_COLUMNS]
@@ -72,14 +69,16 @@ def import_poses(dataset: Dataset, path: Path, system: System) -> Imported:
     return Imported(len(set(known) - set(answers)), conventions.warning(path))
 
 
-def poses_of(path: Path, system: System, known: Collection[int], where: str) -> dict[int, PoseResult]:
+def poses_of(
+    path: Path, system: System, known: Collection[int], where: str, pose_format: str = TABLE
+) -> dict[int, PoseResult]:
     """frame_id to pose of a file for a dataset with some frames. where: names the dataset.
 
     Raises:
         UserError: a name that is not usable, a file that cannot be read, poses that are wrong, or an unknown frame.
     """
     _check_name(system.name)
-    answers = read_poses(path)
+    answers = read_poses(path, pose_format)
     unknown = sorted(set(answers).difference(known))
     if unknown:
         more = f" and {len(unknown) - 1} more" if len(unknown) > 1 else ""
@@ -97,94 +96,32 @@ def _check_name(name: str) -> None:
         raise UserError(f"name {name!r} is a solver's; give --name another one")
 
 
-def read_poses(path: Path) -> dict[int, PoseResult]:
+def read_poses(path: Path, pose_format: str = TABLE) -> dict[int, PoseResult]:
     """frame_id to pose. A row is a failure if its `status` says another thing than ok, or its whole pose is empty.
 
     Raises:
-        UserError: what is wrong with the file, its columns or its first wrong row.
+        UserError: a format that is not known, or what is wrong with the file, its columns or its first wrong row.
     """
-    columns = _columns(path)
-    rotation = _chosen(path, columns, (QUATERNION_COLUMNS, MATRIX))
+    if pose_format not in FORMATS:
+        raise UserError(f"unknown --pose-format {pose_format!r}; give one of {', '.join(FORMATS)}")
+    form = FORMATS[pose_format]
+    columns = columns_of(path, form.read)
+    rotation = _chosen(path, columns, (QUATERNION_COLUMNS, MATRIX, VECTOR))
     position = _chosen(path, columns, POSITIONS)
     numbers = {name: _numbers(path, name, columns[name]) for name in (FRAME, *rotation, *position)}
     frames = _frames(path, numbers[FRAME])
     R = np.stack([numbers[name] for name in rotation], axis=1)
     t = np.stack([numbers[name] for name in position], axis=1)
     statuses = [str(status or "").strip() or Status.OK for status in columns.get("status", [None] * len(frames))]
-    return {
-        frame: _pose(path, frame, R[i], t[i]) if status.lower() == Status.OK else PoseResult(status[:MOST_LETTERS])
-        for i, (frame, status) in enumerate(zip(frames, statuses, strict=True))
-    }
-
-
-def _columns(path: Path) -> dict[str, list[Any]]:
-    """Name to values; of CSV they are text.
-
-    Raises:
-        UserError: a file that cannot be read.
-    """
-    read = READERS.get(path.suffix.lower())
-    if read is None:
-        raise UserError(f"{path} is neither .csv nor .parquet; give --poses one of them")
-    if path.exists() and not path.is_file():
-        raise UserError(f"cannot read {path}: it is no regular file, and may never end; give --poses a file")
-    if path.exists() and path.stat().st_size > MOST_BYTES:
-        raise UserError(f"{path} has more than {MOST_BYTES // 10**6} MB; give --poses a file with a row for each image")
-    try:
-        header, values = read(path)
-    except UnicodeDecodeError:
-        raise UserError(f"cannot read {path}: it is not UTF-8 text; give --poses a .csv or .parquet file") from None
-    except OSError as error:
-        raise UserError(f"cannot read {path}: {error.strerror or 'it is damaged'}; give --poses another file") from None
-    except (pa.ArrowException, csv.Error, MemoryError) as error:
-        raise UserError(f"cannot read {path}: {_first_line(error)}; give --poses another file") from None
-    twice = next((name for i, name in enumerate(header) if name in header[:i]), None)
-    if twice is not None:
-        raise UserError(f"{path} has the column {twice!r} twice; leave one out")
-    return dict(zip(header, values, strict=True))
-
-
-def _read_parquet(path: Path) -> NamesAndColumns:
-    with pq.ParquetFile(path) as file:
-        _check_rows(path, file.metadata.num_rows)
-        names = [name for name in file.schema_arrow.names if name in KNOWN]
-        table = file.read(names)
-        # Of other columns the names alone are told where one is missing.
-        others = [name for name in file.schema_arrow.names if name not in KNOWN]
-    values = [column.to_pylist() for column in table.columns]
-    return [*table.column_names, *others], [*values, *([] for _ in others)]
-
-
-def _read_csv(path: Path) -> NamesAndColumns:
-    """A CSV file's header and columns.
-
-    `csv` reads it and not `pyarrow.csv`, which guesses types (`true` becomes 1, text that is not UTF-8 becomes bytes, a
-    wrong number a column of text), keeps blanks before names and quotes, and counts lines without the empty ones: it
-    could not say which value of which line is wrong.
-    """
-    with open(path, encoding="utf-8-sig", newline="") as file:
-        lines = csv.reader(file, skipinitialspace=True)
-        first, rows = next(lines, []), list(itertools.islice(lines, MOST_ROWS + 1))
-    _check_rows(path, len(rows))
-    header = [name.strip() for name in first]
-    return header, _transposed(path, header, rows)
-
-
-def _check_rows(path: Path, count: int) -> None:
-    if count > MOST_ROWS:
-        raise UserError(f"{path} has more than {MOST_ROWS} rows; give --poses a file with a row for each image")
-
-
-READERS: dict[str, Callable[[Path], NamesAndColumns]] = {".parquet": _read_parquet, ".csv": _read_csv}
-
-
-def _transposed(path: Path, header: list[str], rows: list[list[str]]) -> list[list[Any]]:
-    """Columns of a CSV file's rows; empty lines are skipped."""
-    for line, row in enumerate(rows, 2):
-        if row and len(row) != len(header):
-            raise UserError(f"{path}, line {line} has {len(row)} values under {len(header)} columns; mend that line")
-    filled = [row for row in rows if row]
-    return [[row[i] for row in filled] for i in range(len(header))]
+    with np.errstate(over="ignore"):  # numbers near the largest float: their squares are refused as infinite
+        return {
+            frame: (
+                _cam_from_obj(form, _pose(path, frame, R[i], t[i]))
+                if status.lower() == Status.OK
+                else PoseResult(status[:MOST_LETTERS])
+            )
+            for i, (frame, status) in enumerate(zip(frames, statuses, strict=True))
+        }
 
 
 def _chosen(path: Path, columns: dict[str, list[Any]], choices: tuple[tuple[str, ...], ...]) -> tuple[str, ...]:
@@ -225,7 +162,7 @@ def _frames(path: Path, numbers: Array) -> list[int]:
 
 
 def _pose(path: Path, frame: int, rotation: Array, t: Array) -> PoseResult:
-    """One row's pose. rotation: (4,) quaternion or (9,) matrix row by row."""
+    """One row's pose. rotation: (4,) quaternion, (9,) matrix row by row, or (3,) rotation vector in rad."""
     if np.all(np.isnan(rotation)) and np.all(np.isnan(t)):
         return PoseResult(Status.NO_SOLUTION)
     where = f"{path}, frame_id {frame}"
@@ -236,6 +173,8 @@ def _pose(path: Path, frame: int, rotation: Array, t: Array) -> PoseResult:
         if abs(length - 1.0) > TOLERANCE:
             raise UserError(f"{where}: the quaternion has length {length:.6g}; it must be 1 to within {TOLERANCE:g}")
         return pose_result(Pose.from_quaternion(rotation, t).R, t)
+    if len(rotation) == len(VECTOR):
+        return pose_result(rotation_from_vector(rotation), t)
     R = rotation.reshape(3, 3)
     off = float(np.abs(R.T @ R - np.eye(3)).max())
     if off > TOLERANCE or np.linalg.det(R) < 0.0:
@@ -244,5 +183,10 @@ def _pose(path: Path, frame: int, rotation: Array, t: Array) -> PoseResult:
     return pose_result(R, t)
 
 
-def _first_line(error: Exception) -> str:
-    return str(error).split("\n")[0].rstrip(".")
+def _cam_from_obj(form: PoseFormat, given: PoseResult) -> PoseResult:
+    """A pose of another format in ours: cam_from_obj, mm."""
+    if given.status != Status.OK:
+        return given
+    pose = Pose(given.R, given.t * form.mm)
+    pose = pose.inverse() if form.is_camera_in_world else pose
+    return pose_result(pose.R, pose.t)

@@ -19,6 +19,7 @@ from pipelines.stages import estimate_images as systems
 from pipelines.stages.import_poses import import_poses
 from pipelines.stages.kernels import compiled_ahead, wait_for
 from pipelines.stages.missing import Execution, Stage, run_missing
+from pipelines.stages.pose_formats import TABLE
 from pipelines.stages.settings import Setting, System, check_detector, check_target
 
 MAKE_AGAIN = "; --overwrite makes them again"
@@ -90,13 +91,14 @@ def run_bound(dataset: Dataset, execution: Execution) -> None:
     run_missing(stage, dataset, _indices(dataset, execution), execution)
 
 
-def run_import(dataset: Dataset, path: Path, system: System, execution: Execution) -> None:
+def run_import(dataset: Dataset, path: Path, system: System, execution: Execution, pose_format: str = TABLE) -> None:
     """Take another system's poses from a file; tell how many frames it left out, and a likely mistake in their form.
 
+    pose_format: of `pose_formats.FORMATS`.
     Raises:
-        UserError: a name, file or pose that is not usable.
+        UserError: a format, name, file or pose that is not usable.
     """
-    told = import_poses(dataset, path, system)
+    told = import_poses(dataset, path, system, pose_format)
     if told.warning:
         print(printable(f"warning: {told.warning}"), file=sys.stderr)
     if told.missing:

@@ -50,7 +50,9 @@ def _expected(name):
 
 
 def _scored(folder, path):
-    code, said = _pipelines("score", folder, "--poses", path, "--name", re.sub("[^a-z]+", "-", path.name))
+    form = re.match("(?:kitti|tum|colmap|bop|euroc)?", path.name)[0] or "table"
+    name = re.sub("[^a-z]+", "-", path.name)
+    code, said = _pipelines("score", folder, "--poses", path, "--pose-format", form, "--name", name)
     sentence = re.split(r"(?<=[a-z)])\. |report:", said.replace(str(path), path.name))[0][:180]
     return f"exit code {code}: {sentence}" if code or "warning" in said.lower() else f"read, exit code {code}"
 

@@ -9,6 +9,7 @@ from eposit import Pose, Status
 from eposit.pose import rotation_from_vector
 from pipelines.adapters.results import PoseResult
 from pipelines.stages.pose_conventions import ConventionErrors
+from pipelines.stages.pose_formats import FORMATS, TABLE
 
 COUNT = 40
 
@@ -27,8 +28,8 @@ def moved(true, radians, share):
     return Pose(R, true.t + share * np.linalg.norm(true.t, axis=1, keepdims=True) * rng.standard_normal((COUNT, 3)))
 
 
-def warning_of(found, status=Status.OK, true=None):
-    errors = ConventionErrors()
+def warning_of(found, status: str = Status.OK, true=None, form=TABLE):
+    errors = ConventionErrors(FORMATS[form])
     answers = {i: PoseResult(status, found.R[i], found.t[i]) for i in range(COUNT)}
     for half in (range(COUNT // 2), range(COUNT // 2, COUNT)):
         rows = np.array(half)
@@ -66,6 +67,21 @@ def test_another_unit_or_direction_is_named(change, words, noise):
 @pytest.mark.parametrize("noise", [0.0, 1e-9, 0.01, 0.1, 1.0])
 def test_good_and_poor_poses_are_left_alone(noise):
     assert warning_of(moved(true_poses(), noise, noise)) is None
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda pose: scaled(pose, 1e3), "hold positions in mm instead of metres: read"),
+        (lambda pose: pose.inverse(), "hold cam_from_obj instead of obj_from_cam: read"),
+        (lambda pose: pose, None),
+    ],
+    ids=["mm", "inverse", "good"],
+)
+def test_what_is_meant_is_told_in_the_terms_of_the_format(change, words):
+    """TUM's are metres and obj_from_cam, and are converted before."""
+    warning = warning_of(change(true_poses()), form="tum")
+    assert warning is None if words is None else words in (warning or "")
 
 
 def test_a_few_gross_failures_hide_nothing():
