@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
+from scipy.spatial.transform import Rotation
 
 from pipelines.nightly.history import History
 from pipelines.nightly.other_code import digest_of
@@ -34,7 +35,7 @@ def test_every_command_has_a_line_in_the_guide():
 
 @pytest.fixture
 def place(root, tmp_path, monkeypatch):
-    """A folder with a dataset wherever the documents say one is, the examples, README's solver, a file of poses."""
+    """A folder with a dataset wherever the documents say one is, the examples, README's solver, files of poses."""
     for name in {match for _, line in LINES for match in re.findall(r"out/[\w-]+", line)}:
         (tmp_path / name).parent.mkdir(exist_ok=True)
         shutil.copytree(root, tmp_path / name)
@@ -45,8 +46,16 @@ def place(root, tmp_path, monkeypatch):
     rows = pq.read_table(root / "frames", columns=columns).to_pylist()
     lines = [",".join(columns), *(",".join(str(value) for value in row.values()) for row in rows)]
     (tmp_path / "poses.csv").write_text("\n".join(lines) + "\n")
+    (tmp_path / "trajectory.txt").write_text("".join(map(of_tum, rows)))
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+def of_tum(row):
+    """A line of a trajectory: the camera's place in the world, m, with the frame's number for its time."""
+    inverse = Rotation.from_quat([row[f"q_{axis}"] for axis in "xyzw"]).inv()
+    place = inverse.apply([-1e-3 * row[f"t_{axis}_mm"] for axis in "xyz"])
+    return " ".join(map(str, (row["frame_id"], *place, *inverse.as_quat()))) + "\n"
 
 
 def test_quick_commands_run(place, cli):
