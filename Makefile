@@ -41,7 +41,7 @@ test-full: $(SETUP)  ## adds kills, a Ray cluster, an object store, and other en
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check "ray>=2.9" playwright
 	@# A folder of its own: it needs another pydantic than ours.
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade --target build/moto "moto[server]>=5"
-	$(BIN)/python -m pytest -m full
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m full
 
 check-slow: $(SETUP)  ## kills at random moments, two commands at once
 	$(BIN)/python -m pytest -m slow
