@@ -21,7 +21,7 @@ FEW, FEW_SOFTNESS = ((0.5, 6), (1.2, 8), (2.4, 8)), 0.3
 MANY, MANY_SOFTNESS = ((0.4, 6), (0.8, 8), (1.2, 10), (1.8, 12), (2.6, 12)), 0.2
 SPREAD = 0.1  # of the contrast: light that may come from each direction beyond that of lamp and surroundings
 DOUBTFUL = 1.1  # times as much as is left of the residuals with further shadows: the one may be in a wrong place
-MISSING = 1.3  # likewise: one lamp does not explain them
+MISSING = 1.2  # likewise: one lamp does not explain them
 LEFT_OUT = 1.5  # times the stated error of a fit with many shadows: a lamp may stand between two directions
 
 
