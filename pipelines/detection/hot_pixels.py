@@ -7,10 +7,10 @@ import numpy as np
 
 from eposit.arrays import Array
 from pipelines.detection.finders import Grey
+from pipelines.spread import NORMAL_MAD
 
 LEAST_EXCESS = 20.0  # grey values that a pixel must lie beyond all its neighbours; a blurred board has none such
 EXCESS_NOISES = 8.0  # and so many deviations of the noise between neighbours
-NORMAL_MAD = 1.4826  # standard deviations to a median absolute deviation
 ROWS = 4  # of so many rows one tells the noise
 RING = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], np.uint8)
 

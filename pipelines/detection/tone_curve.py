@@ -18,6 +18,7 @@ from pipelines.detection.board_map import BoardMap
 from pipelines.detection.corner_blur import edge_profiles
 from pipelines.detection.corner_sites import CornerSites
 from pipelines.detection.finders import Grey
+from pipelines.spread import NORMAL_MAD
 
 Light = NDArray[np.float32]  # (height, width) light, on the scale of grey values
 
@@ -25,7 +26,6 @@ EXPONENTS = np.linspace(1.0, 3.2, 12)  # of the curve grey = light^(1 / exponent
 SURE = 4.0  # standard errors that the exponent must differ from 1
 LEAST_EXPONENT = 1.1  # below it a correction is smaller than what else moves edges
 LEAST_PROFILES = 8
-NORMAL_MAD = 1.4826  # standard deviations to a median absolute deviation
 
 
 def decoded(image: Grey, exponent: float) -> Light:

@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from eposit.arrays import Array
+from pipelines.spread import NORMAL_MAD
 
 ROUNDING = 1.0 / 12.0  # variance of rounding to whole grey values
-TO_DEVIATION = 1.4826  # a normal deviation over its median absolute one
 ENDS = 0.25  # of the range of grey values: what is taken for dark and for bright
 RANGE = (5.0, 95.0)  # percentiles
 EDGE_SHARE = 0.25  # of the strongest slope of the picture: from there a pixel lies on an edge
@@ -55,4 +55,4 @@ class Noise(NamedTuple):
 
 
 def _variance(residuals: Array) -> float:
-    return float((TO_DEVIATION * np.median(np.abs(residuals))) ** 2)
+    return float((NORMAL_MAD * np.median(np.abs(residuals))) ** 2)

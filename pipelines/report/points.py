@@ -13,6 +13,7 @@ from datasets.rows import covariances_by_frame, numbers, of_detector, points_by_
 from datasets.store.dataset import Dataset
 from eposit.arrays import Array, Mask
 from pipelines.report.data import frame_means
+from pipelines.spread import NORMAL_MAD
 from pipelines.statistics import Interval, root, student
 
 STEEP_DEG = 45.0
@@ -156,7 +157,7 @@ def _row(item: PointErrors, mask: Mask) -> dict[str, Any]:
     return {
         "corners": len(corners),
         "rms": _rms(corners),
-        "scatter": 1.4826 * float(np.median(np.abs(corners))) if len(corners) else np.nan,
+        "scatter": NORMAL_MAD * float(np.median(np.abs(corners))) if len(corners) else np.nan,
         "mean_x": _mean(corners[:, 0]),
         "mean_y": _mean(corners[:, 1]),
         "mean_radial": _mean(item.radial[mask, :-1][ok[:, :-1]]),
