@@ -67,8 +67,12 @@ def faults(found):
     said = [f"{own.wrong} points are called ok and are not"] if own.wrong else []
     if own.slowest_s > SLOWEST_S:
         said.append(f"slowest {own.slowest_s:.1f} s")
-    if np.isfinite(own.normalised) and not NORMALISED[0] <= own.normalised <= NORMALISED[1]:
-        said.append(f"normalised error {own.normalised:.2f}")
+    disc = figures(found[OURS], "disc")
+    for of, normalised in (("", own.normalised), (" of the circle", disc.normalised)):
+        if np.isfinite(normalised) and not NORMALISED[0] <= normalised <= NORMALISED[1]:
+            said.append(f"normalised error{of} {normalised:.2f}")
+    if disc.wrong:
+        said.append(f"{disc.wrong} circles are called ok and are not")
     for detector in found.keys() - {OURS}:
         other = figures(found[detector])
         if other.found > own.found:
