@@ -61,6 +61,14 @@ def test_faults_are_sentences():
     assert faults({OURS: {0: measured(KIND, OURS, *shot_and_answer(shift=0.01), 0.1)}}) == []
 
 
+def test_circles_are_judged_where_there_are_ten():
+    shot, answer = shot_and_answer(shift=0.01)
+    answer.points[-1] += 0.02
+    row = measured(KIND, OURS, shot, answer, 0.1)
+    assert faults({OURS: dict.fromkeys(range(9), row)}) == []
+    assert faults({OURS: dict.fromkeys(range(10), row)}) == ["normalised error of the circle 3.00"]
+
+
 def test_results_hold_until_a_source_changes(tmp_path, monkeypatch):
     results = Results(tmp_path)
     results.keep(KIND, OURS, {4: {"found": 1}})
