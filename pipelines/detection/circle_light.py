@@ -11,17 +11,31 @@ from dataclasses import replace
 import numpy as np
 
 from eposit.arrays import Array
-from pipelines.detection.circle_model import SHADOW, SHAPE, DiscFit, Patch, Prior, cost_of, fit_disc, shadow_of
+from pipelines.detection.circle_model import (
+    BLOCKED,
+    LAMP,
+    SHADOW,
+    SHAPE,
+    WHITE_GREY,
+    DiscFit,
+    Patch,
+    Prior,
+    cost_of,
+    fit_disc,
+    shadow_of,
+)
 
 Rings = tuple[tuple[float, int], ...]
 
 # Rings of shadows: heights by which they are displaced, and how many there are. Few tell whether one lamp is enough.
-STARTS = ((0.0, 1), (1.0, 6))  # where the one shadow is looked for if it seems to be in a wrong place
+STARTS = ((0.0, 1), (1.0, 6))  # where the one shadow is looked for if it seems to be in a wrong place;
+TRIED = 3  # of them are fitted
 FEW, FEW_SOFTNESS = ((0.5, 6), (1.2, 8), (2.4, 8)), 0.3
 MANY, MANY_SOFTNESS = ((0.4, 6), (0.8, 8), (1.2, 10), (1.8, 12), (2.6, 12)), 0.2
 SPREAD = 0.1  # of the contrast: light that may come from each direction beyond that of lamp and surroundings
 DOUBTFUL = 1.1  # times as much as is left of the residuals with further shadows: the one may be in a wrong place
 MISSING = 1.2  # likewise: one lamp does not explain them
+POSSIBLE = 0.05  # of the white's grey: light that a fit may lack or have too much, by noise and rims of other forms
 LEFT_OUT = 1.5  # times the stated error of a fit with many shadows: a lamp may stand between two directions
 
 
@@ -34,14 +48,21 @@ def fit_in_any_light(patch: Patch, known: Prior, height: float, contrast: float)
     """
     plain = fit_disc(patch, known)
     unexplained = _unexplained(plain, patch, known, height, contrast)
-    if unexplained > DOUBTFUL:
-        again = fit_disc(patch, replace(known, start=_best_start(patch, known, height)))
-        if again.converged and again.residual < plain.residual:
-            plain, unexplained = again, _unexplained(again, patch, known, height, contrast)
+    if unexplained > DOUBTFUL or not _is_possible(plain):
+        starts = _best_starts(patch, known, height)
+        plain = min((plain, *(fit_disc(patch, replace(known, start=start)) for start in starts)), key=_credit)
+        unexplained = _unexplained(plain, patch, known, height, contrast)
     if unexplained <= MISSING:
         return plain
     fit = fit_disc(*_lit(patch, known, MANY, MANY_SOFTNESS, height, contrast))
     return replace(fit, covariance=fit.covariance * LEFT_OUT**2) if fit.converged else plain
+
+
+def _is_possible(fit: DiscFit) -> bool:
+    """Whether lamp and surroundings give light, and together no more than falls on the white."""
+    white, blocked, lamp = fit.values[WHITE_GREY], fit.values[BLOCKED], fit.values[LAMP]
+    beyond = max(-lamp, -blocked, max(lamp, 0.0) + max(blocked, 0.0) - white)
+    return bool(lamp > 0.0 and beyond < POSSIBLE * white)
 
 
 def _unexplained(fit: DiscFit, patch: Patch, known: Prior, height: float, contrast: float) -> float:
@@ -50,13 +71,18 @@ def _unexplained(fit: DiscFit, patch: Patch, known: Prior, height: float, contra
     return fit.residual * len(patch.grey) / max(left, 1e-12)
 
 
-def _best_start(patch: Patch, known: Prior, height: float) -> Array:
-    """The start with the shadow in the place that fits best: from a wrong one it may stay where none can be seen."""
-    starts = [known.start]
+def _credit(fit: DiscFit) -> tuple[bool, float]:
+    """Smaller for a fit that is to be believed rather."""
+    return not fit.converged, fit.residual * (1.0 if _is_possible(fit) else DOUBTFUL)
+
+
+def _best_starts(patch: Patch, known: Prior, height: float) -> list[Array]:
+    """The starts whose shadow fits best: from a wrong place it may stay where none can be seen."""
+    starts = []
     for place in _places(STARTS, height):
         starts.append(known.start.copy())
         starts[-1][SHADOW] = place
-    return min(starts, key=lambda start: cost_of(patch, known, start))
+    return sorted(starts, key=lambda start: cost_of(patch, known, start))[:TRIED]
 
 
 def _places(rings: Rings, height: float) -> list[tuple[float, float]]:

@@ -33,6 +33,7 @@ SECTORS = 12  # of the disc's surroundings, whose residuals are held against eac
 USUAL_SCATTER = 1.5  # of these over the noise: a picture that the model explains stays below
 FURTHEST_STEP = np.array([0.15, 0.15, 0.02, 0.02, 0.02, 0.15, 0.15, 0.05])  # in one iteration
 SOFTNESS_LIMITS = (0.01, 0.6)
+BOX = math.sqrt(12.0)  # width of a box over its standard deviation
 ROUNDING = 1.0 / 12.0  # variance of a grey value that was rounded: no picture is better known
 STEPS = 60
 START_NOISE = 4.0  # variance, grey values^2, before any is known
@@ -193,7 +194,9 @@ def fit_disc(patch: Patch, prior: Prior) -> DiscFit:
             values[:SHAPE] += step[:SHAPE]
             covariance = np.linalg.inv(normal) * noise
             factor = _unexplained(patch, jacobian, best, covariance)
-            return DiscFit(values, covariance * factor, True, float(best @ best / len(best)), factor)
+            moved = _rim_doubt(patch, values, np.linalg.solve(normal, jacobian.T))
+            covariance = covariance * factor + np.outer(moved, moved)
+            return DiscFit(values, covariance, True, float(best @ best / len(best)), factor)
         trial = values.copy()
         trial[:SHAPE] += np.clip(step[:SHAPE], -FURTHEST_STEP, FURTHEST_STEP)
         trial[SHADOW] = np.clip(trial[SHADOW], -prior.furthest_shadow, prior.furthest_shadow)
@@ -267,6 +270,20 @@ def _unexplained(patch: Patch, jacobian: Array, residual: Array, covariance: Arr
     noise = _noise(jacobian, residual)
     scatter = np.trace(np.linalg.solve(covariance[:2, :2], moved.T @ moved)) / (2.0 * noise**2)
     return max(1.0, float(scatter) / USUAL_SCATTER)
+
+
+def _rim_doubt(patch: Patch, values: Array, solved: Array) -> Array:
+    """(14 + m,) by how much the fit would move if the shadow's rim were a straight ramp as wide as the bell's integral.
+
+    How the rim of a shadow goes from dark to light depends on the lamp's form, which is not known: of a disc, of a
+    window, of a row of lamps. A bell and a box lie on both sides of most.
+
+    solved: (14 + m, n) change of the numbers for a change of the pixels.
+    """
+    opened, _ = _open_share(patch.on_disc, values, patch.per_px, patch.finer)
+    beyond = np.hypot(*(patch.on_board - values[SHADOW][:, None, None])) - 1.0
+    ramp = np.clip(0.5 - beyond / (BOX * values[SOFTNESS]), 0.0, 1.0)
+    return solved @ _at_pixels(patch, values[LAMP] * opened * (ramp - _shadow(patch.on_board, values)[0]))
 
 
 def _at_pixels(patch: Patch, fine: Array) -> Array:
