@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
-from eposit.arrays import Array, Mask
+from eposit.arrays import Array
 from pipelines.detection.board_map import BoardMap, grid
 from pipelines.detection.circle_light import fit_in_any_light
 from pipelines.detection.circle_model import (
@@ -29,21 +31,19 @@ from pipelines.detection.circle_model import (
     SIZE,
     SOFTNESS,
     WHITE_GREY,
+    DiscFit,
     Patch,
     Prior,
     cost_of,
+    fit_disc,
 )
+from pipelines.detection.circle_patch import Picture, circle_patch
 from pipelines.detection.consistency import Corners
-from pipelines.detection.finders import Grey
-from pipelines.detection.kernels import compiled
 from render.targets.chessboard import Chessboard
-from render.targets.disc_shade import blocked_share
 
-FINE, COARSE = 3, 2  # cells to a pixel along each side: for small patches, for large ones
-LARGE_PX = 45  # side of a patch from which the blur is well sampled by the coarse grid
-CLEAR_BLURS = 3.0  # blurs between a pixel and the next black square
-BAND_PX = 1.5  # pixels of the board around the circle, beyond that
-LEAST_PIXELS = 40
+WHITE_PERCENT = 95.0  # of the patch's pixels that are no brighter than its white, but for noise
+MOST_CLIPPED = 0.1  # share of the board's pixels: clipped edges look sharper than they are
+SHARPENED, SHARPENED_TO = (1.0, 2.6, 0.25), 0.01  # times as blurred as they look, from, to, by; how well it is found
 START_SHADOW = (0.18, 0.18, 0.18)  # place and softness, in heights of the circle above the board
 SIZE_SPREAD = 0.003  # the board's map gives the size to this: nearer or farther it looks the same to five in a thousand
 FORM_SPREAD, MISFIT_SLOPES = 0.0001, 6.0  # likewise its form; and misfits of the map, squares, that its slopes are off
@@ -65,8 +65,6 @@ LARGE_RADIUS_PX = 60.0  # a larger circle is read in means of pixels that leave 
 LEAST_BLUR_PX = 0.7  # below it the fine grid would sample them badly
 MOST_RADIUS_PX = 150.0  # a larger one is read in means whatever it costs: 0.03 px instead of 0.01, in bounded time
 LEAST_AXIS = 1.5  # blurs: a disc whose smaller half axis is below this has no edges of its own
-
-Picture = Grey | NDArray[np.float32]  # (height, width) grey values
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,11 +89,11 @@ def find_circle(
         return None
     harmless = min(math.ceil(axes[0] / LARGE_RADIUS_PX), max(1, int(blur_px / LEAST_BLUR_PX)))
     by = max(harmless, math.ceil(axes[0] / MOST_RADIUS_PX))
+    unsure = _unsure(board, target)
     if by > 1:
-        small = _means(image, by)
-        found = _fitted_circle(small, board.reduced(by), blur_px / by, contrast, target, misfit, _unsure(board, target))
+        found = _Place(_means(image, by), board.reduced(by), contrast, target, misfit, unsure).circle(blur_px / by)
         return found and Circle((found.centre_px + 0.5) * by - 0.5, found.covariance_px2 * by**2)
-    return _fitted_circle(image, board, blur_px, contrast, target, misfit, _unsure(board, target))
+    return _Place(image, board, contrast, target, misfit, unsure).circle(blur_px)
 
 
 def _means(image: Picture, by: int) -> NDArray[np.float32]:
@@ -105,40 +103,83 @@ def _means(image: Picture, by: int) -> NDArray[np.float32]:
     return np.asarray(cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA), np.float32)
 
 
-def _fitted_circle(
-    image: Picture, board: BoardMap, blur_px: float, contrast: float, target: Chessboard, misfit: float, unsure: Array
-) -> Circle | None:
-    """The circle in a picture in which it is not too large.
+@dataclass(frozen=True)
+class _Place:
+    """Where the board puts the circle, in a picture in which it is not too large."""
 
-    unsure: (2, 2) covariance of where the board puts it, squares^2.
-    """
-    at, height = target.circle_centre[:2] / target.square_mm, target.circle_height_mm / target.square_mm
-    radius = target.circle_radius_mm / target.square_mm
-    centre, jacobian = board(at, height), board.jacobian(at, height)
-    known = _beforehand(contrast, target.circle_height_mm / target.circle_radius_mm, misfit)
-    doubt = _doubt(unsure)
-    patches = [
-        _patch(image, board, centre, jacobian, blur_px, target, more) for more in ((0.0, doubt) if doubt else (0.0,))
-    ]
-    fits = [
-        fit_in_any_light(
-            patch,
-            replace(known, start=_best_start(patch, known, unsure, radius)) if k else known,
-            target.circle_height_mm / target.circle_radius_mm,
-            contrast,
-        )
-        for k, patch in enumerate(patches)
-        if patch is not None
-    ]
-    if not fits:
-        return None
-    fit = fits[0] if fits[0].residual <= GOOD_SHARE * fits[-1].residual + ROUNDING else fits[-1]
-    shift = fit.values[:2]
-    found = fit.converged and _is_near(shift * radius, unsure) and abs(fit.values[SIZE] - 1.0) < SIZE_LIMIT
-    if not found or fit.values[WHITE_GREY] - fit.values[DISC_GREY] < LEAST_CONTRAST * contrast:
-        return None
-    to_px = jacobian * radius
-    return Circle(centre + to_px @ shift, to_px @ fit.covariance[:2, :2] @ to_px.T)
+    image: Picture
+    board: BoardMap
+    contrast: float
+    target: Chessboard
+    misfit: float
+    unsure: Array  # (2, 2) covariance of the place, squares^2
+
+    @property
+    def radius(self) -> float:
+        """Squares."""
+        return self.target.circle_radius_mm / self.target.square_mm
+
+    @property
+    def height(self) -> float:
+        """Above the board, radii."""
+        return self.target.circle_height_mm / self.target.circle_radius_mm
+
+    @cached_property
+    def seen(self) -> tuple[Array, Array]:
+        """The picture of the centre (2,) px, and its change with places on the circle's plane (2, 2), radii."""
+        at, height = self.target.circle_centre[:2] / self.target.square_mm, self.height * self.radius
+        return self.board(at, height), self.board.jacobian(at, height) * self.radius
+
+    def circle(self, blur_px: float) -> Circle | None:
+        """The circle, if it is here."""
+        fit = self._best_fit(blur_px)
+        if fit is None or not fit.converged or abs(fit.values[SIZE] - 1.0) > SIZE_LIMIT:
+            return None
+        shift, (centre, to_px) = fit.values[:2], self.seen
+        dark = fit.values[WHITE_GREY] - fit.values[DISC_GREY] > LEAST_CONTRAST * self.contrast
+        if not dark or not _is_near(shift * self.radius, self.unsure):
+            return None
+        return Circle(centre + to_px @ shift, to_px @ fit.covariance[:2, :2] @ to_px.T)
+
+    def _best_fit(self, blur_px: float) -> DiscFit | None:
+        """Of the circle where the board puts it and, if the place is unsure, of one that is looked for around it."""
+        patch, doubt = self._patch(blur_px), _doubt(self.unsure)
+        if patch is not None and patch.clipped > MOST_CLIPPED:
+            blur_px *= self._sharpened(blur_px)
+            patch = self._patch(blur_px)
+        around = self._patch(blur_px, doubt) if doubt else None
+        fits = [] if patch is None else [self._fit(patch, self._known(patch))]
+        if around is not None:
+            known = self._known(around)
+            fits.append(self._fit(around, replace(known, start=_best_start(around, known, self.unsure, self.radius))))
+        if not fits:
+            return None
+        return fits[0] if fits[0].residual <= GOOD_SHARE * fits[-1].residual + ROUNDING else fits[-1]
+
+    def _patch(self, blur_px: float, doubt: float = 0.0) -> Patch | None:
+        return circle_patch(self.image, self.board, self.seen, blur_px, self.target, doubt)
+
+    def _fit(self, patch: Patch, known: Prior) -> DiscFit:
+        return fit_in_any_light(patch, known, self.height, self._light(patch))
+
+    def _known(self, patch: Patch) -> Prior:
+        return _beforehand(self._light(patch), self.height, self.misfit)
+
+    def _light(self, patch: Patch) -> float:
+        """Grey value of the white."""
+        return max(self.contrast, float(np.percentile(patch.grey, WHITE_PERCENT)))
+
+    def _sharpened(self, blur_px: float) -> float:
+        """Share of the blur that a picture has whose edges look sharper because it is clipped: what fits best."""
+
+        def left(share: float) -> float:
+            patch = self._patch(share * blur_px)
+            return np.inf if patch is None else fit_disc(patch, self._known(patch)).residual
+
+        looks = np.arange(*SHARPENED)
+        best = int(np.argmin([left(share) for share in looks]))
+        between = looks[max(best - 1, 0)], looks[min(best + 1, len(looks) - 1)]
+        return float(minimize_scalar(left, bounds=between, method="bounded", options={"xatol": SHARPENED_TO}).x)
 
 
 def misfit_squares(corners: Corners, at: Array) -> float:
@@ -199,10 +240,10 @@ def _is_near(shift: Array, unsure: Array) -> bool:
     return bool(shift @ np.linalg.solve(allowed, shift) < 9.0 and np.linalg.norm(shift) < FARTHEST_SHARE)
 
 
-def _beforehand(contrast: float, height: float, misfit: float) -> Prior:
+def _beforehand(light: float, height: float, misfit: float) -> Prior:
     """What is known of the circle before its pixels are looked at; what is not known has a wide spread.
 
-    height: of the circle above the board, radii.
+    light: grey value of the white. height: of the circle above the board, radii.
     """
     start = np.array([0.0, 0.0, 1.0, 0.0, 0.0, *(height * share for share in START_SHADOW)])
     expected, spread = np.zeros(SHAPE + LINEAR), np.full(SHAPE + LINEAR, 1e6)
@@ -210,81 +251,7 @@ def _beforehand(contrast: float, height: float, misfit: float) -> Prior:
     spread[OBLONG] = math.hypot(FORM_SPREAD, MISFIT_SLOPES * misfit)
     spread[SHADOW] = height * SHADOW_SPREAD
     expected[SOFTNESS], spread[SOFTNESS] = height * SOFTNESS_MEAN, height * SOFTNESS_SPREAD
-    spread[WHITE_GREY + 1 : BLOCKED] = 0.5 * contrast
-    expected[BLOCKED], spread[BLOCKED] = 0.3 * contrast, 0.3 * contrast
-    expected[LAMP], spread[LAMP] = 0.6 * contrast, 0.6 * contrast
+    spread[WHITE_GREY + 1 : BLOCKED] = 0.5 * light
+    expected[BLOCKED], spread[BLOCKED] = 0.3 * light, 0.3 * light
+    expected[LAMP], spread[LAMP] = 0.6 * light, 0.6 * light
     return Prior(start, expected, spread, FURTHEST_SHADOW * height)
-
-
-def _kernel(blur_px: float, finer: int) -> Array:
-    """Taps of the blur on the fine grid, an even number of them where the pixel's centre lies between two cells."""
-    sigma = np.sqrt(max((blur_px * finer) ** 2 - 1.0 / 12.0, 0.2))  # a fine cell is a mean already
-    taps = 2 * int(np.ceil(4.0 * sigma)) + finer % 2
-    bell = np.exp(-0.5 * ((np.arange(taps) - (taps - 1) / 2.0) / sigma) ** 2)
-    return bell / bell.sum()
-
-
-def _patch(
-    image: Picture, board: BoardMap, centre: Array, jacobian: Array, blur_px: float, target: Chessboard, doubt: float
-) -> Patch | None:
-    """The pixels around the circle that see it or its white square; None if it reaches out of the image.
-
-    doubt: squares by which the circle may lie elsewhere.
-    """
-    at, height = target.circle_centre[:2] / target.square_mm, target.circle_height_mm / target.square_mm
-    radius = target.circle_radius_mm / target.square_mm
-    foot = board(at)
-    reach = (radius + doubt) * np.linalg.norm(jacobian, axis=1) + CLEAR_BLURS * blur_px + BAND_PX
-    low = np.floor(np.minimum(centre, foot) - reach).astype(int)
-    high = np.ceil(np.maximum(centre, foot) + reach).astype(int) + 1
-    if np.any(low < 0) or np.any(high > image.shape[::-1]) or np.any(high - low > min(image.shape)):
-        return None
-    finer = COARSE if np.max(high - low) > LARGE_PX else FINE
-    fine_x, fine_y = ((np.arange((high[k] - low[k]) * finer) + 0.5) / finer - 0.5 + low[k] for k in range(2))
-    planes = board.meet_planes(fine_x, fine_y, np.array([0.0, height]))
-    on_board, on_disc = (planes - at[:, None, None]) / radius
-    size = np.sqrt(abs(np.linalg.det(jacobian))) * radius
-    blocked = blocked_share(np.hypot(*on_board), 1.0, height / radius)
-    shape = (high[1] - low[1], finer, high[0] - low[0], finer)
-    squares = (planes[0].reshape(2, *shape)).mean(axis=(2, 4))
-    margin = CLEAR_BLURS * blur_px * np.linalg.norm(np.linalg.inv(jacobian), axis=1)
-    white = np.empty(squares[0].shape, bool)
-    _on_white(squares[0], squares[1], margin, target.columns, target.rows, target.margin_squares, white)
-    rows, columns = map(np.ascontiguousarray, np.nonzero(white))
-    if len(rows) < LEAST_PIXELS:
-        return None
-    grey = image[low[1] : high[1], low[0] : high[0]].astype(np.float64)[rows, columns]
-    return Patch(
-        grey=grey,
-        rows=rows,
-        columns=columns,
-        on_board=on_board,
-        on_disc=on_disc,
-        slope_x=(fine_x - centre[0])[None] / size,
-        slope_y=(fine_y - centre[1])[:, None] / size,
-        blocked=blocked,
-        shadows=np.empty((0, *blocked.shape)),
-        per_px=np.linalg.inv(jacobian) / radius,
-        kernel=_kernel(blur_px, finer),
-        finer=finer,
-    )
-
-
-@compiled
-def _on_white(x: Array, y: Array, margin: Array, columns: int, rows: int, border: float, out: Mask) -> None:
-    """Which board coordinates x, y (h, w) lie on white and `margin` (2,) squares away from black and the border."""
-    for i in range(out.shape[0]):
-        for j in range(out.shape[1]):
-            out[i, j] = True
-            for k in range(9):
-                u, v = x[i, j] + (k % 3 - 1) * margin[0], y[i, j] + (k // 3 - 1) * margin[1]
-                column, row = math.floor(u) + 1, math.floor(v) + 1
-                inside = -1.0 - border < u < columns - 1 + border and -1.0 - border < v < rows - 1 + border
-                black = 0 <= column < columns and 0 <= row < rows and (column + row) % 2 == 0
-                if black or not inside:
-                    out[i, j] = False
-
-
-def prepare() -> None:
-    """Call the compiled function once."""
-    _on_white(np.zeros((0, 0)), np.zeros((0, 0)), np.zeros(2), 4, 4, 1.0, np.zeros((0, 0), bool))

@@ -32,29 +32,29 @@ STARTS = ((0.0, 1), (1.0, 6))  # where the one shadow is looked for if it seems 
 TRIED = 3  # of them are fitted
 FEW, FEW_SOFTNESS = ((0.5, 6), (1.2, 8), (2.4, 8)), 0.3
 MANY, MANY_SOFTNESS = ((0.4, 6), (0.8, 8), (1.2, 10), (1.8, 12), (2.6, 12)), 0.2
-SPREAD = 0.1  # of the contrast: light that may come from each direction beyond that of lamp and surroundings
+SPREAD = 0.1  # of the white's grey: light that may come from each direction beyond that of lamp and surroundings
 DOUBTFUL = 1.1  # times as much as is left of the residuals with further shadows: the one may be in a wrong place
 MISSING = 1.2  # likewise: one lamp does not explain them
 POSSIBLE = 0.05  # of the white's grey: light that a fit may lack or have too much, by noise and rims of other forms
 LEFT_OUT = 1.5  # times the stated error of a fit with many shadows: a lamp may stand between two directions
 
 
-def fit_in_any_light(patch: Patch, known: Prior, height: float, contrast: float) -> DiscFit:
+def fit_in_any_light(patch: Patch, known: Prior, height: float, light: float) -> DiscFit:
     """The simplest fit that explains the picture.
 
     Further shadows are taken only where they are needed: each makes the disc's place less certain.
 
-    height: of the circle above the board, radii. contrast: grey values.
+    height: of the circle above the board, radii. light: grey value of the white.
     """
     plain = fit_disc(patch, known)
-    unexplained = _unexplained(plain, patch, known, height, contrast)
+    unexplained = _unexplained(plain, patch, known, height, light)
     if unexplained > DOUBTFUL or not _is_possible(plain):
         starts = _best_starts(patch, known, height)
         plain = min((plain, *(fit_disc(patch, replace(known, start=start)) for start in starts)), key=_credit)
-        unexplained = _unexplained(plain, patch, known, height, contrast)
+        unexplained = _unexplained(plain, patch, known, height, light)
     if unexplained <= MISSING:
         return plain
-    fit = fit_disc(*_lit(patch, known, MANY, MANY_SOFTNESS, height, contrast))
+    fit = fit_disc(*_lit(patch, known, MANY, MANY_SOFTNESS, height, light))
     return replace(fit, covariance=fit.covariance * LEFT_OUT**2) if fit.converged else plain
 
 
@@ -65,9 +65,9 @@ def _is_possible(fit: DiscFit) -> bool:
     return bool(lamp > 0.0 and beyond < POSSIBLE * white)
 
 
-def _unexplained(fit: DiscFit, patch: Patch, known: Prior, height: float, contrast: float) -> float:
+def _unexplained(fit: DiscFit, patch: Patch, known: Prior, height: float, light: float) -> float:
     """How many times its residuals are those that further shadows would leave, the disc staying where it is."""
-    left = cost_of(*_lit(patch, known, FEW, FEW_SOFTNESS, height, contrast), fit.values[:SHAPE])
+    left = cost_of(*_lit(patch, known, FEW, FEW_SOFTNESS, height, light), fit.values[:SHAPE])
     return fit.residual * len(patch.grey) / max(left, 1e-12)
 
 
@@ -91,13 +91,11 @@ def _places(rings: Rings, height: float) -> list[tuple[float, float]]:
     return [(far * float(np.cos(turn)), far * float(np.sin(turn))) for far, turn in turns]
 
 
-def _lit(
-    patch: Patch, known: Prior, rings: Rings, softness: float, height: float, contrast: float
-) -> tuple[Patch, Prior]:
+def _lit(patch: Patch, known: Prior, rings: Rings, softness: float, height: float, light: float) -> tuple[Patch, Prior]:
     """The patch and what is known of it with the shadows of lamps all around."""
     places = _places(rings, height)
     shadows = np.array([shadow_of(patch.on_board, place, softness * height) for place in places])
-    mean, spread = np.zeros(len(places)), np.full(len(places), SPREAD * contrast)
+    mean, spread = np.zeros(len(places)), np.full(len(places), SPREAD * light)
     return (
         replace(patch, shadows=shadows),
         replace(known, mean=np.append(known.mean, mean), spread=np.append(known.spread, spread)),

@@ -56,6 +56,7 @@ class Patch:
     per_px: Array  # (2, 2) radii per px
     kernel: Array  # (k,) taps of the blur on the fine grid
     finer: int  # cells of the fine grid to a pixel, along each side
+    clipped: float  # share of the board's pixels that are left out because they are as bright as a pixel can be
 
 
 @dataclass(frozen=True, slots=True)

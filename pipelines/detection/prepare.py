@@ -11,8 +11,8 @@ from typing import Any
 from numba.core import event
 
 from pipelines.detection import (
-    circle,
     circle_model,
+    circle_patch,
     corner_likeness,
     corner_model,
     generic_lens,
@@ -25,8 +25,8 @@ from pipelines.detection import (
 )
 
 MODULES = (  # those with compiled functions; the slowest first
-    corner_model, generic_lens, circle_model, saddle_links, saddle_peaks, saddles, corner_likeness, circle, grid_steps,
-    levels, sampling,
+    corner_model, generic_lens, circle_model, saddle_links, saddle_peaks, saddles, corner_likeness,
+    circle_patch, grid_steps, levels, sampling,
 )  # fmt: skip
 
 

@@ -1,0 +1,102 @@
+"""The pixels around the raised circle that its fit reads, and the fine grid over them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eposit.arrays import Array, Mask
+from pipelines.detection.board_map import BoardMap
+from pipelines.detection.circle_model import Patch
+from pipelines.detection.finders import Grey
+from pipelines.detection.kernels import compiled
+from render.targets.chessboard import Chessboard
+from render.targets.disc_shade import blocked_share
+
+FINE, COARSE = 3, 2  # cells to a pixel along each side: for small patches, for large ones
+LARGE_PX = 45  # side of a patch from which the blur is well sampled by the coarse grid
+CLEAR_BLURS = 3.0  # blurs between a pixel and the next black square
+BAND_PX = 1.5  # pixels of the board around the circle, beyond that
+LEAST_PIXELS = 40
+CLIPPED = 254.5  # grey values: a pixel this bright may have had any light
+
+Picture = Grey | NDArray[np.float32]  # (height, width) grey values
+
+
+def _kernel(blur_px: float, finer: int) -> Array:
+    """Taps of the blur on the fine grid, an even number of them where the pixel's centre lies between two cells."""
+    sigma = np.sqrt(max((blur_px * finer) ** 2 - 1.0 / 12.0, 0.2))  # a fine cell is a mean already
+    taps = 2 * int(np.ceil(4.0 * sigma)) + finer % 2
+    bell = np.exp(-0.5 * ((np.arange(taps) - (taps - 1) / 2.0) / sigma) ** 2)
+    return bell / bell.sum()
+
+
+def circle_patch(
+    image: Picture, board: BoardMap, seen: tuple[Array, Array], blur_px: float, target: Chessboard, doubt: float
+) -> Patch | None:
+    """The pixels around the circle that see it or its white square; None if it reaches out of the image.
+
+    seen: picture of the circle's centre (2,) px, and its change with places on the circle's plane (2, 2), px a radius.
+    doubt: squares by which the circle may lie elsewhere.
+    """
+    at, height = target.circle_centre[:2] / target.square_mm, target.circle_height_mm / target.square_mm
+    radius = target.circle_radius_mm / target.square_mm
+    (centre, to_px), foot = seen, board(at)
+    from_px = np.linalg.inv(to_px)
+    reach = (1.0 + doubt / radius) * np.linalg.norm(to_px, axis=1) + CLEAR_BLURS * blur_px + BAND_PX
+    low = np.floor(np.minimum(centre, foot) - reach).astype(int)
+    high = np.ceil(np.maximum(centre, foot) + reach).astype(int) + 1
+    if np.any(low < 0) or np.any(high > image.shape[::-1]) or np.any(high - low > min(image.shape)):
+        return None
+    finer = COARSE if np.max(high - low) > LARGE_PX else FINE
+    fine_x, fine_y = ((np.arange((high[k] - low[k]) * finer) + 0.5) / finer - 0.5 + low[k] for k in range(2))
+    planes = board.meet_planes(fine_x, fine_y, np.array([0.0, height]))
+    on_board, on_disc = (planes - at[:, None, None]) / radius
+    size = np.sqrt(abs(np.linalg.det(to_px)))
+    blocked = blocked_share(np.hypot(*on_board), 1.0, height / radius)
+    shape = (high[1] - low[1], finer, high[0] - low[0], finer)
+    squares = (planes[0].reshape(2, *shape)).mean(axis=(2, 4))
+    margin = CLEAR_BLURS * blur_px * radius * np.linalg.norm(from_px, axis=1)
+    white = np.empty(squares[0].shape, bool)
+    _on_white(squares[0], squares[1], margin, target.columns, target.rows, target.margin_squares, white)
+    part = image[low[1] : high[1], low[0] : high[0]].astype(np.float64)
+    rows, columns = map(np.ascontiguousarray, np.nonzero(white & (part < CLIPPED)))
+    if len(rows) < LEAST_PIXELS:
+        return None
+    return Patch(
+        grey=part[rows, columns],
+        rows=rows,
+        columns=columns,
+        on_board=on_board,
+        on_disc=on_disc,
+        slope_x=(fine_x - centre[0])[None] / size,
+        slope_y=(fine_y - centre[1])[:, None] / size,
+        blocked=blocked,
+        shadows=np.empty((0, *blocked.shape)),
+        per_px=from_px,
+        kernel=_kernel(blur_px, finer),
+        finer=finer,
+        clipped=1.0 - len(rows) / np.count_nonzero(white),
+    )
+
+
+@compiled
+def _on_white(x: Array, y: Array, margin: Array, columns: int, rows: int, border: float, out: Mask) -> None:
+    """Which board coordinates x, y (h, w) lie on white and `margin` (2,) squares away from black and the border."""
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] = True
+            for k in range(9):
+                u, v = x[i, j] + (k % 3 - 1) * margin[0], y[i, j] + (k // 3 - 1) * margin[1]
+                column, row = math.floor(u) + 1, math.floor(v) + 1
+                inside = -1.0 - border < u < columns - 1 + border and -1.0 - border < v < rows - 1 + border
+                black = 0 <= column < columns and 0 <= row < rows and (column + row) % 2 == 0
+                if black or not inside:
+                    out[i, j] = False
+
+
+def prepare() -> None:
+    """Call the compiled function once."""
+    _on_white(np.zeros((0, 0)), np.zeros((0, 0)), np.zeros(2), 4, 4, 1.0, np.zeros((0, 0), bool))
