@@ -103,31 +103,44 @@ def _detect_chessboard(image: Grey, target: Chessboard, detector: str) -> Detect
         corners = _corners(image, seen, target, detector)
     except np.linalg.LinAlgError:  # corners that no camera could see
         return _nothing(count, PointStatus.CORNERS_INCONSISTENT, seen.finder)
-    if too_many_bad(corners.consistent):
+    if too_many_bad(corners.consistent[: len(seen.ids)]):
         return _nothing(count, PointStatus.CORNERS_INCONSISTENT, seen.finder)
-    misfit = misfit_squares(corners, grid(target.inner)[seen.ids])
+    ids = np.append(seen.ids, _unseen(seen, target))[: len(corners.consistent)]
+    misfit = misfit_squares(corners, grid(target.inner)[ids])
     light = decoded(image, corners.exponent)
-    circle = find_circle(light, corners.board, corners.blur_px, corners.contrast, target, misfit)
+    circle = find_circle(light, corners, target, misfit)
     points, covariance = np.full((count, 2), np.nan), np.full((count, 2, 2), np.nan)
     status = np.full(count, PointStatus.POINT_NOT_FOUND, STATUS_TYPE)
-    status[seen.ids] = np.where(corners.consistent, PointStatus.OK, PointStatus.CORNERS_INCONSISTENT)
-    good = seen.ids[corners.consistent]
+    good = ids[corners.consistent]
+    status[seen.ids], status[good] = PointStatus.CORNERS_INCONSISTENT, PointStatus.OK
     points[good], covariance[good] = (part[corners.consistent] for part in (corners.points_px, corners.covariance_px2))
     status[-1] = PointStatus.CIRCLE_NOT_FOUND
     if circle is not None:
-        points[-1], covariance[-1], status[-1] = circle.centre_px, circle.covariance_px2, PointStatus.OK
+        points[-1], status[-1] = circle.centre_px, PointStatus.OK
+        covariance[-1] = circle.covariance_px2
     return Detection(points, covariance, status, seen.finder, corners.blur_px, corners.exponent)
 
 
 def _corners(image: Grey, seen: SeenPoints, target: Chessboard, detector: str) -> Corners:
-    """The corners that were seen, in the order of their ids, placed by our fit or by OpenCV."""
+    """The corners that were seen, in the order of their ids, placed by our fit or by OpenCV.
+
+    By ours, those that were not seen follow.
+    """
     size = (image.shape[1], image.shape[0])
-    sites = chessboard_sites(target).chosen(seen.ids)
-    fitted = refine_corners(image, first_map(seen, size, target), sites)
+    every = chessboard_sites(target)
+    sites, unseen = every.chosen(seen.ids), every.chosen(_unseen(seen, target))
+    fitted = refine_corners(
+        image, first_map(seen, size, target), sites, unseen if detector == Detector.EDGE_FIT else None
+    )
     if detector == Detector.EDGE_FIT or not np.any(fitted.consistent):
         return fitted
     placed = subpix(image, seen.points_px) if detector == Detector.OPENCV_SUBPIX else seen.points_px
     return check_placed(placed, fitted, sites.at, size)
+
+
+def _unseen(seen: SeenPoints, target: Chessboard) -> NDArray[np.intp]:
+    """Ids of the corners that were not seen."""
+    return np.setdiff1d(np.arange(target.circle_index), seen.ids)
 
 
 def _nothing(count: int, status: PointStatus, finder: str) -> Detection:

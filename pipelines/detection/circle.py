@@ -18,10 +18,11 @@ from scipy.optimize import minimize_scalar
 
 from eposit.arrays import Array
 from pipelines.detection.board_map import BoardMap, grid
-from pipelines.detection.circle_light import fit_in_any_light
+from pipelines.detection.circle_light import MUCH_CLIPPED, fit_in_any_light
 from pipelines.detection.circle_model import (
     BLOCKED,
     DISC_GREY,
+    DISC_SLOPE,
     LAMP,
     LINEAR,
     OBLONG,
@@ -31,6 +32,7 @@ from pipelines.detection.circle_model import (
     SIZE,
     SOFTNESS,
     WHITE_GREY,
+    WHITE_SLOPE,
     DiscFit,
     Patch,
     Prior,
@@ -42,7 +44,6 @@ from pipelines.detection.consistency import Corners
 from render.targets.chessboard import Chessboard
 
 WHITE_PERCENT = 95.0  # of the patch's pixels that are no brighter than its white, but for noise
-MOST_CLIPPED = 0.1  # share of the board's pixels: clipped edges look sharper than they are
 SHARPENED, SHARPENED_TO = (1.0, 2.6, 0.25), 0.01  # times as blurred as they look, from, to, by; how well it is found
 START_SHADOW = (0.18, 0.18, 0.18)  # place and softness, in heights of the circle above the board
 SIZE_SPREAD = 0.003  # the board's map gives the size to this: nearer or farther it looks the same to five in a thousand
@@ -60,6 +61,9 @@ LOOKS = (5, 9)  # places along both axes of the ellipse in which a circle is loo
 LOOK_SPREADS = 10.0  # half its axes, in deviations of the prediction: it is far from linear
 GOOD_SHARE = 1.2  # of the residuals of the best fit in the ellipse, up to which a fit from the prediction is kept
 FAR_SPREADS = 3.0  # of the prediction that a circle may lie off, for each that a linear map allows
+OFF_SHARE = 0.02  # of how far it lies off: a map that is wrong there has the circle's form a little wrong, too
+CORNERS_SHARE = 0.25  # of the corners' stated error that a circle has at least: what moves them moves it
+USUALLY_LEFT, MOST_LEFT = 1.5, 30.0  # times the corners' noise that a fit leaves: no model of a disc explains more
 SIZE_LIMIT = 0.03  # of the size
 LARGE_RADIUS_PX = 60.0  # a larger circle is read in means of pixels that leave its edges this blur:
 LEAST_BLUR_PX = 0.7  # below it the fine grid would sample them badly
@@ -75,25 +79,25 @@ class Circle:
     covariance_px2: Array  # (2, 2)
 
 
-def find_circle(
-    image: Picture, board: BoardMap, blur_px: float, contrast: float, target: Chessboard, misfit: float = 0.0
-) -> Circle | None:
+def find_circle(image: Picture, corners: Corners, target: Chessboard, misfit: float = 0.0) -> Circle | None:
     """The circle's centre, or None if there is no dark disc where the board puts it.
 
-    blur_px, contrast: of the board's edges. misfit: RMS distance of the corners from the board's map, squares.
+    misfit: RMS distance of the corners from the board's map, squares.
     """
+    board = corners.board
     at, height = target.circle_centre[:2] / target.square_mm, target.circle_height_mm / target.square_mm
     radius = target.circle_radius_mm / target.square_mm
     axes = np.linalg.svd(board.jacobian(at, height), compute_uv=False) * radius
-    if axes[-1] < LEAST_AXIS * blur_px:
+    if axes[-1] < LEAST_AXIS * corners.blur_px:
         return None
-    harmless = min(math.ceil(axes[0] / LARGE_RADIUS_PX), max(1, int(blur_px / LEAST_BLUR_PX)))
+    harmless = min(math.ceil(axes[0] / LARGE_RADIUS_PX), max(1, int(corners.blur_px / LEAST_BLUR_PX)))
     by = max(harmless, math.ceil(axes[0] / MOST_RADIUS_PX))
     unsure = _unsure(board, target)
-    if by > 1:
-        found = _Place(_means(image, by), board.reduced(by), contrast, target, misfit, unsure).circle(blur_px / by)
-        return found and Circle((found.centre_px + 0.5) * by - 0.5, found.covariance_px2 * by**2)
-    return _Place(image, board, contrast, target, misfit, unsure).circle(blur_px)
+    if by == 1:
+        return _Place(image, corners, target, misfit, unsure).circle()
+    small = replace(corners, board=board.reduced(by), blur_px=corners.blur_px / by, noise=corners.noise / by**2)
+    found = _Place(_means(image, by), small, target, misfit, unsure).circle()
+    return found and Circle((found.centre_px + 0.5) * by - 0.5, found.covariance_px2 * by**2)
 
 
 def _means(image: Picture, by: int) -> NDArray[np.float32]:
@@ -108,8 +112,7 @@ class _Place:
     """Where the board puts the circle, in a picture in which it is not too large."""
 
     image: Picture
-    board: BoardMap
-    contrast: float
+    corners: Corners
     target: Chessboard
     misfit: float
     unsure: Array  # (2, 2) covariance of the place, squares^2
@@ -128,23 +131,31 @@ class _Place:
     def seen(self) -> tuple[Array, Array]:
         """The picture of the centre (2,) px, and its change with places on the circle's plane (2, 2), radii."""
         at, height = self.target.circle_centre[:2] / self.target.square_mm, self.height * self.radius
-        return self.board(at, height), self.board.jacobian(at, height) * self.radius
+        return self.corners.board(at, height), self.corners.board.jacobian(at, height) * self.radius
 
-    def circle(self, blur_px: float) -> Circle | None:
+    def circle(self) -> Circle | None:
         """The circle, if it is here."""
-        fit = self._best_fit(blur_px)
-        if fit is None or not fit.converged or abs(fit.values[SIZE] - 1.0) > SIZE_LIMIT:
+        fit = self._best_fit()
+        left = np.nan if fit is None else fit.residual / max(self.corners.noise, ROUNDING)
+        if fit is None or not fit.converged or abs(fit.values[SIZE] - 1.0) > SIZE_LIMIT or left > MOST_LEFT:
             return None
         shift, (centre, to_px) = fit.values[:2], self.seen
-        dark = fit.values[WHITE_GREY] - fit.values[DISC_GREY] > LEAST_CONTRAST * self.contrast
+        dark = fit.values[WHITE_GREY] - fit.values[DISC_GREY] > LEAST_CONTRAST * self.corners.contrast
         if not dark or not _is_near(shift * self.radius, self.unsure):
             return None
-        return Circle(centre + to_px @ shift, to_px @ fit.covariance[:2, :2] @ to_px.T)
+        covariance = to_px @ fit.covariance[:2, :2] @ to_px.T * max(1.0, left / USUALLY_LEFT)
+        return Circle(centre + to_px @ shift, covariance + self._doubt(to_px @ shift))
 
-    def _best_fit(self, blur_px: float) -> DiscFit | None:
+    def _doubt(self, off: Array) -> Array:
+        """(2, 2) px^2, beyond that of the fit, of a circle that lies so far (2,) px off its prediction."""
+        corners = np.median(self.corners.covariance_px2[self.corners.consistent], axis=0)
+        return OFF_SHARE**2 * (off @ off) * np.eye(2) + CORNERS_SHARE**2 * corners
+
+    def _best_fit(self) -> DiscFit | None:
         """Of the circle where the board puts it and, if the place is unsure, of one that is looked for around it."""
-        patch, doubt = self._patch(blur_px), _doubt(self.unsure)
-        if patch is not None and patch.clipped > MOST_CLIPPED:
+        blur_px, doubt = self.corners.blur_px, _looked_for(self.unsure)
+        patch = self._patch(blur_px)
+        if patch is not None and patch.clipped > MUCH_CLIPPED:
             blur_px *= self._sharpened(blur_px)
             patch = self._patch(blur_px)
         around = self._patch(blur_px, doubt) if doubt else None
@@ -157,7 +168,7 @@ class _Place:
         return fits[0] if fits[0].residual <= GOOD_SHARE * fits[-1].residual + ROUNDING else fits[-1]
 
     def _patch(self, blur_px: float, doubt: float = 0.0) -> Patch | None:
-        return circle_patch(self.image, self.board, self.seen, blur_px, self.target, doubt)
+        return circle_patch(self.image, self.corners.board, self.seen, blur_px, self.target, doubt)
 
     def _fit(self, patch: Patch, known: Prior) -> DiscFit:
         return fit_in_any_light(patch, known, self.height, self._light(patch))
@@ -167,7 +178,7 @@ class _Place:
 
     def _light(self, patch: Patch) -> float:
         """Grey value of the white."""
-        return max(self.contrast, float(np.percentile(patch.grey, WHITE_PERCENT)))
+        return max(self.corners.contrast, float(np.percentile(patch.grey, WHITE_PERCENT)))
 
     def _sharpened(self, blur_px: float) -> float:
         """Share of the blur that a picture has whose edges look sharper because it is clipped: what fits best."""
@@ -214,7 +225,7 @@ def _unsure(board: BoardMap, target: Chessboard) -> Array:
     return change @ np.linalg.pinv((slopes / size).T @ (slopes / size), rcond=1e-12, hermitian=True) @ change.T
 
 
-def _doubt(unsure: Array) -> float:
+def _looked_for(unsure: Array) -> float:
     """Squares around the prediction in which the circle is looked for; 0 where the prediction is sure."""
     spread = math.sqrt(np.linalg.eigvalsh(unsure)[-1])
     return min(LOOK_SPREADS * spread, FARTHEST_SHARE) if spread > SURE_SHARE else 0.0
@@ -251,7 +262,7 @@ def _beforehand(light: float, height: float, misfit: float) -> Prior:
     spread[OBLONG] = math.hypot(FORM_SPREAD, MISFIT_SLOPES * misfit)
     spread[SHADOW] = height * SHADOW_SPREAD
     expected[SOFTNESS], spread[SOFTNESS] = height * SOFTNESS_MEAN, height * SOFTNESS_SPREAD
-    spread[WHITE_GREY + 1 : BLOCKED] = 0.5 * light
+    spread[WHITE_SLOPE], spread[DISC_SLOPE] = 0.5 * light, 0.01 * light
     expected[BLOCKED], spread[BLOCKED] = 0.3 * light, 0.3 * light
     expected[LAMP], spread[LAMP] = 0.6 * light, 0.6 * light
     return Prior(start, expected, spread, FURTHEST_SHADOW * height)

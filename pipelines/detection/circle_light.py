@@ -33,9 +33,11 @@ TRIED = 3  # of them are fitted
 FEW, FEW_SOFTNESS = ((0.5, 6), (1.2, 8), (2.4, 8)), 0.3
 MANY, MANY_SOFTNESS = ((0.4, 6), (0.8, 8), (1.2, 10), (1.8, 12), (2.6, 12)), 0.2
 SPREAD = 0.1  # of the white's grey: light that may come from each direction beyond that of lamp and surroundings
+MUCH_CLIPPED = 0.1  # of the pixels: edges look sharper than they are, and little of the shadow is left to see
 DOUBTFUL = 1.1  # times as much as is left of the residuals with further shadows: the one may be in a wrong place
 MISSING = 1.2  # likewise: one lamp does not explain them
-POSSIBLE = 0.05  # of the white's grey: light that a fit may lack or have too much, by noise and rims of other forms
+AS_GOOD = 1.01, 1.1  # times the residuals of the best, and where much is clipped
+POSSIBLE = 0.1  # of the white's grey: light that a fit may lack or have too much, by noise and rims of other forms
 LEFT_OUT = 1.5  # times the stated error of a fit with many shadows: a lamp may stand between two directions
 
 
@@ -48,9 +50,9 @@ def fit_in_any_light(patch: Patch, known: Prior, height: float, light: float) ->
     """
     plain = fit_disc(patch, known)
     unexplained = _unexplained(plain, patch, known, height, light)
-    if unexplained > DOUBTFUL or not _is_possible(plain):
+    if unexplained > DOUBTFUL or not _is_possible(plain) or patch.clipped > MUCH_CLIPPED:
         starts = _best_starts(patch, known, height)
-        plain = min((plain, *(fit_disc(patch, replace(known, start=start)) for start in starts)), key=_credit)
+        plain = _best_of([plain, *(fit_disc(patch, replace(known, start=start)) for start in starts)], patch)
         unexplained = _unexplained(plain, patch, known, height, light)
     if unexplained <= MISSING:
         return plain
@@ -71,9 +73,14 @@ def _unexplained(fit: DiscFit, patch: Patch, known: Prior, height: float, light:
     return fit.residual * len(patch.grey) / max(left, 1e-12)
 
 
-def _credit(fit: DiscFit) -> tuple[bool, float]:
-    """Smaller for a fit that is to be believed rather."""
-    return not fit.converged, fit.residual * (1.0 if _is_possible(fit) else DOUBTFUL)
+def _best_of(fits: list[DiscFit], patch: Patch) -> DiscFit:
+    """The fit with the smallest residuals; how far others lie that are as good is in its covariance."""
+    best = min(fits, key=lambda fit: (not fit.converged, fit.residual))
+    limit = best.residual * AS_GOOD[int(patch.clipped > MUCH_CLIPPED)]
+    others = [fit for fit in fits if fit.converged and fit.residual < limit]
+    apart = [fit.values - best.values for fit in others] or [0.0 * best.values]
+    far = max(apart, key=lambda away: float(away[:2] @ away[:2]))
+    return replace(best, covariance=best.covariance + np.outer(far, far))
 
 
 def _best_starts(patch: Patch, known: Prior, height: float) -> list[Array]:

@@ -1,10 +1,11 @@
 """Least squares of the raised circle: a dark disc over a board on which it casts its shade.
 
-On a grid finer than the pixels, the picture is k D + (1 - D) (w + g . x - A b - L s): the disc D with grey k over
-white w with a slope g, of which the disc blocks a share b of the surroundings' light, and the lamp's shadow s, a disc
-of the same size, displaced and with a soft rim. It is blurred by a gaussian and sampled at the pixels. k, w, g, A and L
-are linear and solved along; disc and shadow are moved by Levenberg-Marquardt. Where there are several lamps or windows,
-further shadows stand for the light from a dozen or two of directions, each with an L of its own.
+On a grid finer than the pixels, the picture is (k + h . x) D + (1 - D) (w + g . x - A b - L s): the disc D with grey k
+and a slope h, as stray light has, over white w with a slope g, of which the disc blocks a share b of the surroundings'
+light, and the lamp's shadow s, a disc of the same size, displaced and with a soft rim. It is blurred by a gaussian and
+sampled at the pixels. k, w, g, h, A and L are linear and solved along; disc and shadow are moved by
+Levenberg-Marquardt. Where there are several lamps or windows, further shadows stand for the light from a dozen or two
+of directions, each with an L of its own.
 
 Where the disc's rim lies in its own shade, no edge can be seen; the model knows that and takes the place from the rest.
 """
@@ -24,10 +25,11 @@ from pipelines.detection.kernels import compiled
 Places = NDArray[np.intp]
 # Numbers of a fit, in order: disc x, y, in radii from where it is expected, its size as a ratio, and by how much it is
 # longer along x than along y and along one diagonal than along the other, as shares; shadow x, y from the foot and the
-# softness of its rim, in radii; then k, w, gx, gy (per radius), A, L in grey values; then L of m further shadows.
-SHAPE, LINEAR = 8, 6
+# softness of its rim, in radii; then k, w, gx, gy, hx, hy (per radius), A, L in grey values; then L of m further
+# shadows.
+SHAPE, LINEAR = 8, 8
 SIZE, OBLONG, SHADOW, SOFTNESS = 2, slice(3, 5), slice(5, 7), 7
-DISC_GREY, WHITE_GREY, BLOCKED, LAMP, FURTHER = 8, 9, 12, 13, 14
+DISC_GREY, WHITE_GREY, WHITE_SLOPE, DISC_SLOPE, BLOCKED, LAMP, FURTHER = 8, 9, slice(10, 12), slice(12, 14), 14, 15, 16
 MOVES = 5  # numbers that move the disc
 SECTORS = 12  # of the disc's surroundings, whose residuals are held against each other
 USUAL_SCATTER = 1.5  # of these over the noise: a picture that the model explains stays below
@@ -56,7 +58,7 @@ class Patch:
     per_px: Array  # (2, 2) radii per px
     kernel: Array  # (k,) taps of the blur on the fine grid
     finer: int  # cells of the fine grid to a pixel, along each side
-    clipped: float  # share of the board's pixels that are left out because they are as bright as a pixel can be
+    clipped: float  # share of the board's pixels that are left out as black or white as a pixel can be
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,8 +66,8 @@ class Prior:
     """What is known before the pixels are looked at."""
 
     start: Array  # (8,) shape to start from
-    mean: Array  # (14 + m,)
-    spread: Array  # (14 + m,) standard deviations
+    mean: Array  # (16 + m,)
+    spread: Array  # (16 + m,) standard deviations
     furthest_shadow: float  # radii
 
 
@@ -73,8 +75,8 @@ class Prior:
 class DiscFit:
     """The fit of one disc."""
 
-    values: Array  # (14 + m,)
-    covariance: Array  # (14 + m, 14 + m)
+    values: Array  # (16 + m,)
+    covariance: Array  # (16 + m, 16 + m)
     converged: bool
     residual: float  # mean square, grey values^2
     unexplained: float  # factor of the covariance for what the model leaves out; 1 where it explains the picture
@@ -86,7 +88,7 @@ class _Picture:
 
     opened: Array  # (h, w) share of a fine cell that the disc leaves open
     shade: Array  # (h, w) share of the lamp that is hidden
-    basis: Array  # (n, 6 + m) pixels for a change of the linear numbers
+    basis: Array  # (n, 8 + m) pixels for a change of the linear numbers
     rim: Array  # (5, h, w) change of `opened` with the disc's x, y, size and form
     edge: Array  # (3, h, w) change of `shade` with its x, y and softness
 
@@ -225,12 +227,14 @@ def _draw(patch: Patch, shape: Array) -> _Picture:
     shade, edge = _shadow(patch.on_board, shape)
     white = _at_pixels(patch, opened)
     under = (patch.slope_x, patch.slope_y, -patch.blocked, -shade, *-patch.shadows)
-    basis = np.column_stack((1.0 - white, white, *(_at_pixels(patch, opened * field) for field in under)))
+    slopes, fields = under[:2], [opened * field for field in under]
+    fields[2:2] = [(1.0 - opened) * slope for slope in slopes]
+    basis = np.column_stack((1.0 - white, white, *(_at_pixels(patch, field) for field in fields)))
     return _Picture(opened, shade, basis, rim, edge)
 
 
 def _best_levels(basis: Array, grey: Array, weigh: Array, mean: Array) -> Array:
-    """(6 + m,) linear numbers of least squares with what is known of them beforehand."""
+    """(8 + m,) linear numbers of least squares with what is known of them beforehand."""
     square, side = basis.T @ basis, basis.T @ grey
     square[np.diag_indices_from(square)] += weigh + 1e-9 * square.diagonal()
     return np.linalg.solve(square, side + weigh * mean)
@@ -238,7 +242,7 @@ def _best_levels(basis: Array, grey: Array, weigh: Array, mean: Array) -> Array:
 
 def _moves(patch: Patch, picture: _Picture, values: Array) -> Array:
     """(n, 8) change of the pixels for a change of the shape."""
-    gx, gy = values[WHITE_GREY + 1 : BLOCKED]
+    gx, gy = values[WHITE_SLOPE] - values[DISC_SLOPE]
     under = values[WHITE_GREY] - values[DISC_GREY] + gx * patch.slope_x + gy * patch.slope_y
     under -= values[BLOCKED] * patch.blocked + values[LAMP] * picture.shade
     under -= np.tensordot(values[FURTHER:], patch.shadows, 1)
@@ -274,12 +278,12 @@ def _unexplained(patch: Patch, jacobian: Array, residual: Array, covariance: Arr
 
 
 def _rim_doubt(patch: Patch, values: Array, solved: Array) -> Array:
-    """(14 + m,) by how much the fit would move if the shadow's rim were a straight ramp as wide as the bell's integral.
+    """(16 + m,) by how much the fit would move if the shadow's rim were a straight ramp as wide as the bell's integral.
 
     How the rim of a shadow goes from dark to light depends on the lamp's form, which is not known: of a disc, of a
     window, of a row of lamps. A bell and a box lie on both sides of most.
 
-    solved: (14 + m, n) change of the numbers for a change of the pixels.
+    solved: (16 + m, n) change of the numbers for a change of the pixels.
     """
     opened, _ = _open_share(patch.on_disc, values, patch.per_px, patch.finer)
     beyond = np.hypot(*(patch.on_board - values[SHADOW][:, None, None])) - 1.0

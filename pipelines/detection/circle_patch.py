@@ -20,7 +20,7 @@ LARGE_PX = 45  # side of a patch from which the blur is well sampled by the coar
 CLEAR_BLURS = 3.0  # blurs between a pixel and the next black square
 BAND_PX = 1.5  # pixels of the board around the circle, beyond that
 LEAST_PIXELS = 40
-CLIPPED = 254.5  # grey values: a pixel this bright may have had any light
+CLIPPED = 0.5, 254.5  # grey values: a pixel that is as dark or as bright may have had less light, or more
 
 Picture = Grey | NDArray[np.float32]  # (height, width) grey values
 
@@ -62,7 +62,7 @@ def circle_patch(
     white = np.empty(squares[0].shape, bool)
     _on_white(squares[0], squares[1], margin, target.columns, target.rows, target.margin_squares, white)
     part = image[low[1] : high[1], low[0] : high[0]].astype(np.float64)
-    rows, columns = map(np.ascontiguousarray, np.nonzero(white & (part < CLIPPED)))
+    rows, columns = map(np.ascontiguousarray, np.nonzero(white & (part > CLIPPED[0]) & (part < CLIPPED[1])))
     if len(rows) < LEAST_PIXELS:
         return None
     return Patch(

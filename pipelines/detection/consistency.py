@@ -28,6 +28,7 @@ class Corners:
     blur_px: float  # median blur of the edges
     contrast: float  # median difference between white and black, grey values
     board: BoardMap  # through the consistent ones
+    noise: float = np.nan  # median variance of what the fits leave, grey values^2
     exponent: float = 1.0  # of the picture's tone curve, see `tone_curve`
 
 

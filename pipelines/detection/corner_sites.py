@@ -33,6 +33,10 @@ class CornerSites:
         """Some of the places."""
         return replace(self, at=self.at[which], sense=self.sense[which])
 
+    def followed_by(self, other: CornerSites) -> CornerSites:
+        """These places and behind them others of the same board."""
+        return replace(self, at=np.vstack((self.at, other.at)), sense=np.append(self.sense, other.sense))
+
 
 def chessboard_sites(target: Chessboard) -> CornerSites:
     """The inner corners of the chessboard with a circle."""

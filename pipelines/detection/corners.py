@@ -30,6 +30,8 @@ NEAR_PX, NEAR_BLURS = 5, 2.5  # radius of the first window, px and blurs
 FINAL_PX, FARTHEST_PX = 10, 100  # least and largest radius of the final one
 BAND_PX, BAND_BLURS = 1.0, 3.0  # to either side of an edge: pixels farther off tell nothing of its place
 SHARP_PX = 0.6  # blur below which a pixel's area is no gaussian
+MOST_LOST = 0.5  # of the corners
+LEAST_CONTRAST = 0.2  # of the board's: a corner in a shadow has it, a covered one has not
 FEW = 24  # corners that hardly tell a map's parameters: they are fitted again from the better map
 MISFIT_NOISE = 4.0  # mean squares of a corner's uncertainty that its distance from a good map may have
 FORM_SHARE = 0.4  # of the map's misfit, a square's length along an edge, by which a wrong form moves a corner
@@ -44,11 +46,16 @@ class _Pass(NamedTuple):
 
 
 NEAR = _Pass(steps=8, must_converge=False, reach=0.0)  # enough for a map to start the final one from
+SMALL = _Pass(steps=40, must_converge=True, reach=0.0)  # for corners beside what the final one's model lacks
 FINAL = _Pass(steps=40, must_converge=True, reach=1.0)
 
 
-def refine_corners(image: Grey, board: BoardMap, sites: CornerSites) -> Corners:
-    """Fit every corner near where `board` puts it, clear of the circle: once near by, then over all of its edges."""
+def refine_corners(image: Grey, board: BoardMap, sites: CornerSites, unseen: CornerSites | None = None) -> Corners:
+    """Fit every corner near where `board` puts it, clear of the circle: once near by, then over all of its edges.
+
+    unseen: further corners of the board; they are looked for where the map through the others puts them, and stand
+    behind them in what is returned.
+    """
     at, size = sites.at, (image.shape[1], image.shape[0])
     image = without_hot_pixels(image, board(at), float(np.abs(board.jacobian(at)).max()))
     light = decoded(image, 1.0)
@@ -56,7 +63,7 @@ def refine_corners(image: Grey, board: BoardMap, sites: CornerSites) -> Corners:
     exponent = 0.0
     for _ in range(2 if len(at) < FEW else 1):
         good = corners.consistent
-        if np.mean(~good) > 0.5:
+        if np.mean(~good) > MOST_LOST:
             return corners
         board = _next_map(corners, board, at, size)
         if not exponent:
@@ -65,9 +72,41 @@ def refine_corners(image: Grey, board: BoardMap, sites: CornerSites) -> Corners:
         limits = FINAL._replace(reach=_form_reach(corners, board, at))
         corners, shapes = _fit(light, board, sites, _next_shapes(corners, shapes, board, at), limits)
     corners = replace(corners, exponent=exponent)
-    if np.mean(~corners.consistent) <= 0.5:
+    if np.mean(~corners.consistent) <= MOST_LOST:
         corners = replace(corners, board=_next_map(corners, corners.board, at, size))
-    return drop_inconsistent(corners, at, size)
+        sites, corners = _with_nearby(light, sites, unseen, corners)
+    return drop_inconsistent(corners, sites.at, size)
+
+
+def _with_nearby(
+    image: Light, sites: CornerSites, unseen: CornerSites | None, corners: Corners
+) -> tuple[CornerSites, Corners]:
+    """Corners that no final fit explains, and those that were not seen, fitted to the nearest pixels alone.
+
+    An edge that is no board's, as of a hard shadow, may run through a square and leave its corners free.
+    """
+    if unseen is not None:
+        sites, corners = sites.followed_by(unseen), _with_places_for(corners, len(unseen.at))
+    lost = ~corners.consistent
+    if not np.any(lost):
+        return sites, corners
+    some, board = sites.chosen(lost), corners.board
+    again, shapes = _fit(image, board, some, _start_shapes(board, some.at, corners.blur_px), SMALL, corners.noise)
+    with np.errstate(invalid="ignore"):
+        found = again.consistent & (2.0 * np.abs(shapes[:, CONTRAST]) > LEAST_CONTRAST * corners.contrast)
+    points, covariance, good = corners.points_px.copy(), corners.covariance_px2.copy(), corners.consistent.copy()
+    points[lost], covariance[lost], good[lost] = again.points_px, again.covariance_px2, found
+    return sites, replace(corners, points_px=points, covariance_px2=covariance, consistent=good)
+
+
+def _with_places_for(corners: Corners, more: int) -> Corners:
+    """The corners and behind them so many that are not found."""
+    return replace(
+        corners,
+        points_px=np.vstack((corners.points_px, np.full((more, 2), np.nan))),
+        covariance_px2=np.concatenate((corners.covariance_px2, np.full((more, 2, 2), np.nan))),
+        consistent=np.append(corners.consistent, np.zeros(more, bool)),
+    )
 
 
 def _next_map(corners: Corners, board: BoardMap, at: Array, size: tuple[int, int]) -> BoardMap:
@@ -116,22 +155,29 @@ def _start_shapes(board: BoardMap, at: Array, blur_px: float) -> Array:
     return shapes
 
 
-def _fit(image: Light, board: BoardMap, sites: CornerSites, shapes: Array, limits: _Pass) -> tuple[Corners, Array]:
-    """One pass over all corners, and their shapes; consistent is what converged to a corner of the right sense."""
+def _fit(
+    image: Light, board: BoardMap, sites: CornerSites, shapes: Array, limits: _Pass, usual: float | None = None
+) -> tuple[Corners, Array]:
+    """One pass over all corners, and their shapes; consistent is what converged to a corner of the right sense.
+
+    usual: noise of the board's other corners, where there are any.
+    """
     at = sites.at
     jacobian = board.jacobian(at)
     task = _task(board, jacobian, sites, shapes, limits.reach)
     fitted, covariance, noise, converged = fit_corners(image, task, limits.steps, STOP)
     good = _is_corner(fitted, covariance, task.starts, jacobian, sites)
     with np.errstate(invalid="ignore"):
-        good &= noise <= MOST_NOISE * np.nanmedian(noise) if np.any(good) else True
+        usual = float(np.nanmedian(noise)) if usual is None and np.any(good) else usual
+        good &= noise <= MOST_NOISE * usual if usual is not None else True
     good &= converged if limits.must_converge else True
     points = fitted[:, :2]
     if not np.any(good):
         return Corners(points, covariance, good, np.nan, np.nan, board), fitted
     covariance *= _stated_noise(noise, good)[:, None, None]
     blur, contrast = np.median(fitted[good, BLUR]), 2.0 * np.median(np.abs(fitted[good, CONTRAST]))
-    return Corners(points, covariance, good, float(blur), float(contrast), board), fitted
+    typical = float(np.median(noise[good]))
+    return Corners(points, covariance, good, float(blur), float(contrast), board, typical), fitted
 
 
 def _stated_noise(noise: Array, good: Mask) -> Array:

@@ -9,6 +9,7 @@ from pipelines.detection import circle_light
 from pipelines.detection.board_map import BoardMap, grid
 from pipelines.detection.circle import find_circle
 from pipelines.detection.circle_model import fit_disc
+from pipelines.detection.consistency import Corners
 from render.targets.chessboard import Chessboard
 from tests.supersampled import digitised, picture
 
@@ -116,7 +117,10 @@ def board_with(name, disc=DISC, moved=0.0, lamps=(LAMP,)):
 def found_in(image, camera, blur_px=EDGE_BLUR):
     corners = project(camera, grid(TARGET.inner), 0.0)
     board = BoardMap.fit(grid(TARGET.inner), corners, image.shape[::-1], np.ones(len(corners)))
-    return find_circle(image, board, blur_px, WHITE - BLACK, TARGET)
+    sure = np.zeros((len(corners), 2, 2))
+    return find_circle(
+        image, Corners(corners, sure, np.ones(len(corners), bool), blur_px, WHITE - BLACK, board), TARGET
+    )
 
 
 @pytest.fixture(scope="module")
@@ -151,8 +155,9 @@ def test_what_is_found_is_the_centre_not_the_centroid(drawn, name):
 
 
 # Largest RMS of normalised errors. Near by, the shadow hides under the disc, and what the model of its rim is off
-# weighs as much as the noise (README, "Where it stops"). Measured 0.98, 1.21 and 1.54; 120 numbers tell it to 0.065.
-HONEST = {"far": 1.2, "tilted": 1.4, "near": 1.75}
+# weighs as much as the noise; what is stated allows for it, also where it does not move the circle. Measured 0.79, 0.9
+# and 0.71; 120 numbers tell it to 0.065.
+HONEST = {"far": 1.0, "tilted": 1.1, "near": 0.9}
 
 
 @pytest.mark.parametrize("name", HONEST)
@@ -166,7 +171,7 @@ def test_noise_moves_it_as_far_as_it_states(drawn, name):
         normalised.append(np.linalg.cholesky(np.linalg.inv(circle.covariance_px2)).T @ errors[-1])
     # Measured 0.009, 0.009 and 0.024 px, of which near by 0.022 are the clean picture's.
     assert np.sqrt(np.mean(np.square(errors), axis=0)).max() < 0.03
-    assert 0.8 < np.sqrt(np.mean(np.square(normalised))) < HONEST[name]
+    assert 0.5 < np.sqrt(np.mean(np.square(normalised))) < HONEST[name]
 
 
 # Measured 1.72 and 1.06; 0.04 and 0.02 px off. Taken for one lamp, 4.1 and 6.3, and 0.16 px.
