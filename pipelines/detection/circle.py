@@ -18,7 +18,7 @@ from scipy.optimize import minimize_scalar
 
 from eposit.arrays import Array
 from pipelines.detection.board_map import BoardMap, grid
-from pipelines.detection.circle_light import MUCH_CLIPPED, fit_in_any_light
+from pipelines.detection.circle_light import MUCH_CLIPPED, NO_SLOPE, fit_in_any_light
 from pipelines.detection.circle_model import (
     BLOCKED,
     DISC_GREY,
@@ -63,6 +63,9 @@ GOOD_SHARE = 1.2  # of the residuals of the best fit in the ellipse, up to which
 FAR_SPREADS = 3.0  # of the prediction that a circle may lie off, for each that a linear map allows
 OFF_SHARE = 0.02  # of how far it lies off: a map that is wrong there has the circle's form a little wrong, too
 CORNERS_SHARE = 0.25  # of the corners' stated error that a circle has at least: what moves them moves it
+USUALLY_BEYOND_PX = 0.1  # by which edges differ from those of a gaussian blur in ordinary pictures, defocus included
+BEYOND_SHARE, APART_SHARE = 0.09, 0.3  # of what they differ by more, and along one axis more than along the other, by
+# which a circle may be off: its shade looks like what sharpening and motion leave beside an edge
 USUALLY_LEFT, MOST_LEFT = 1.5, 30.0  # times the corners' noise that a fit leaves: no model of a disc explains more
 SIZE_LIMIT = 0.03  # of the size
 LARGE_RADIUS_PX = 60.0  # a larger circle is read in means of pixels that leave its edges this blur:
@@ -149,7 +152,11 @@ class _Place:
     def _doubt(self, off: Array) -> Array:
         """(2, 2) px^2, beyond that of the fit, of a circle that lies so far (2,) px off its prediction."""
         corners = np.median(self.corners.covariance_px2[self.corners.consistent], axis=0)
-        return OFF_SHARE**2 * (off @ off) * np.eye(2) + CORNERS_SHARE**2 * corners
+        along_x, along_y = np.nan_to_num(self.corners.widths_beyond_px)
+        beyond = max(abs(along_x), abs(along_y), USUALLY_BEYOND_PX) - USUALLY_BEYOND_PX
+        apart = max(abs(along_x - along_y), USUALLY_BEYOND_PX) - USUALLY_BEYOND_PX
+        variance = OFF_SHARE**2 * (off @ off) + (BEYOND_SHARE * beyond) ** 2 + (APART_SHARE * apart) ** 2
+        return variance * np.eye(2) + CORNERS_SHARE**2 * corners
 
     def _best_fit(self) -> DiscFit | None:
         """Of the circle where the board puts it and, if the place is unsure, of one that is looked for around it."""
@@ -262,7 +269,7 @@ def _beforehand(light: float, height: float, misfit: float) -> Prior:
     spread[OBLONG] = math.hypot(FORM_SPREAD, MISFIT_SLOPES * misfit)
     spread[SHADOW] = height * SHADOW_SPREAD
     expected[SOFTNESS], spread[SOFTNESS] = height * SOFTNESS_MEAN, height * SOFTNESS_SPREAD
-    spread[WHITE_SLOPE], spread[DISC_SLOPE] = 0.5 * light, 0.01 * light
+    spread[WHITE_SLOPE], spread[DISC_SLOPE] = 0.5 * light, NO_SLOPE * light
     expected[BLOCKED], spread[BLOCKED] = 0.3 * light, 0.3 * light
     expected[LAMP], spread[LAMP] = 0.6 * light, 0.6 * light
     return Prior(start, expected, spread, FURTHEST_SHADOW * height)

@@ -13,6 +13,7 @@ import numpy as np
 from eposit.arrays import Array
 from pipelines.detection.circle_model import (
     BLOCKED,
+    DISC_SLOPE,
     LAMP,
     SHADOW,
     SHAPE,
@@ -37,6 +38,13 @@ MUCH_CLIPPED = 0.1  # of the pixels: edges look sharper than they are, and littl
 DOUBTFUL = 1.1  # times as much as is left of the residuals with further shadows: the one may be in a wrong place
 MISSING = 1.2  # likewise: one lamp does not explain them
 AS_GOOD = 1.01, 1.1  # times the residuals of the best, and where much is clipped
+NO_SLOPE, STRAY_SLOPE = (
+    1e-6,
+    0.02,
+)  # of the white's grey over a radius: of the disc's grey, and where light strays on it
+STRAY_GAIN = (
+    15.0  # by which the sum of squares must be less with such a slope, in variances: noise does so once in 2000
+)
 POSSIBLE = 0.1  # of the white's grey: light that a fit may lack or have too much, by noise and rims of other forms
 LEFT_OUT = 1.5  # times the stated error of a fit with many shadows: a lamp may stand between two directions
 
@@ -49,6 +57,10 @@ def fit_in_any_light(patch: Patch, known: Prior, height: float, light: float) ->
     height: of the circle above the board, radii. light: grey value of the white.
     """
     plain = fit_disc(patch, known)
+    stray = _with_stray_light(known, light)
+    if plain.residual * len(patch.grey) - cost_of(patch, stray, plain.values[:SHAPE]) > STRAY_GAIN * plain.residual:
+        known = stray
+        plain = fit_disc(patch, known)
     unexplained = _unexplained(plain, patch, known, height, light)
     if unexplained > DOUBTFUL or not _is_possible(plain) or patch.clipped > MUCH_CLIPPED:
         starts = _best_starts(patch, known, height)
@@ -58,6 +70,13 @@ def fit_in_any_light(patch: Patch, known: Prior, height: float, light: float) ->
         return plain
     fit = fit_disc(*_lit(patch, known, MANY, MANY_SOFTNESS, height, light))
     return replace(fit, covariance=fit.covariance * LEFT_OUT**2) if fit.converged else plain
+
+
+def _with_stray_light(known: Prior, light: float) -> Prior:
+    """What is known where the disc's own grey may have a slope."""
+    spread = known.spread.copy()
+    spread[DISC_SLOPE] = STRAY_SLOPE * light
+    return replace(known, spread=spread)
 
 
 def _is_possible(fit: DiscFit) -> bool:

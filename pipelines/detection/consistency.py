@@ -29,6 +29,7 @@ class Corners:
     contrast: float  # median difference between white and black, grey values
     board: BoardMap  # through the consistent ones
     noise: float = np.nan  # median variance of what the fits leave, grey values^2
+    widths_beyond_px: tuple[float, float] = (np.nan, np.nan)  # of edges along x and y, see `widths_beyond`
     exponent: float = 1.0  # of the picture's tone curve, see `tone_curve`
 
 

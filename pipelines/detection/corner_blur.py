@@ -33,6 +33,7 @@ class EdgeProfiles(NamedTuple):
     shares: Array  # (k, s) 0 at the first end and 1 at the last one, but for noise
     step_px: Array  # (k,) px between samples
     rises: Mask  # (k,) whether the last end is the bright one
+    along_y: Mask  # (k,) whether the edge runs along the board's y axis
 
     def flat(self, values: Array) -> Array:
         """(k,) mean of values (k, s) over both ends, where the edge is not."""
@@ -49,11 +50,29 @@ def measured_blur(image: Picture, board: BoardMap, sites: CornerSites) -> float:
     profiles = edge_profiles(image, board, sites)
     if profiles is None:
         return FALLBACK_PX
+    sigma = float(np.median(_widths(profiles)))
+    return float(np.clip(math.sqrt(max(sigma * abs(sigma) - SAMPLING, 0.0)), *LIMITS_PX))
+
+
+def widths_beyond(image: Picture, board: BoardMap, sites: CornerSites, blur_px: float) -> Array:
+    """(2,) by how many px edges along the board's x and y are wider than a gaussian blur makes them; NaN if not seen.
+
+    Motion makes those along one axis wider than along the other. In a sharpened picture, the integral of q (1 - q) is
+    less than the edge's slope says, as q goes beyond 0 and 1.
+    """
+    profiles = edge_profiles(image, board, sites)
+    if profiles is None or profiles.along_y.all() or not profiles.along_y.any():
+        return np.full(2, np.nan)
+    widths = _widths(profiles)
+    both = [np.median(widths[profiles.along_y == along]) for along in (False, True)]
+    return np.array(both) - math.sqrt(blur_px**2 + SAMPLING)
+
+
+def _widths(profiles: EdgeProfiles) -> Array:
+    """(k,) px, standard deviations of a gaussian whose edge has the same integral of q (1 - q)."""
     product = profiles.shares * (1.0 - profiles.shares)
     flat = np.minimum(profiles.flat(product), 0.0)  # noise alone makes it negative
-    widths = math.sqrt(math.pi) * np.sum(product - flat[:, None], axis=1) * profiles.step_px
-    sigma = float(np.median(widths))
-    return float(np.clip(math.sqrt(max(sigma * abs(sigma) - SAMPLING, 0.0)), *LIMITS_PX))
+    return math.sqrt(math.pi) * np.sum(product - flat[:, None], axis=1) * profiles.step_px
 
 
 def edge_profiles(image: Picture, board: BoardMap, sites: CornerSites) -> EdgeProfiles | None:
@@ -66,9 +85,9 @@ def edge_profiles(image: Picture, board: BoardMap, sites: CornerSites) -> EdgePr
     clear = np.abs(contrast) > LEAST_CONTRAST * np.median(np.abs(contrast))
     if not np.any(clear):
         return None
-    return EdgeProfiles(
-        (profiles[clear] - low[clear, None]) / contrast[clear, None], step[clear], contrast[clear] > 0.0
-    )
+    along_y = np.arange(len(step)) >= len(step) // 2
+    shares = (profiles[clear] - low[clear, None]) / contrast[clear, None]
+    return EdgeProfiles(shares, step[clear], contrast[clear] > 0.0, along_y[clear])
 
 
 def _ends(samples: int) -> int:

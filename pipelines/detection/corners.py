@@ -11,7 +11,7 @@ from eposit.arrays import Array, Mask
 from pipelines.detection.board_map import BoardMap, normal_angles
 from pipelines.detection.circle_surroundings import ellipses_around_circle
 from pipelines.detection.consistency import Corners, drop_inconsistent
-from pipelines.detection.corner_blur import measured_blur
+from pipelines.detection.corner_blur import measured_blur, widths_beyond
 from pipelines.detection.corner_model import fit_corners
 from pipelines.detection.corner_picture import BLUR, CONTRAST, MEAN, SHAPE, SLOPE, CornerTask
 from pipelines.detection.corner_sites import CornerSites
@@ -74,6 +74,8 @@ def refine_corners(image: Grey, board: BoardMap, sites: CornerSites, unseen: Cor
     corners = replace(corners, exponent=exponent)
     if np.mean(~corners.consistent) <= MOST_LOST:
         corners = replace(corners, board=_next_map(corners, corners.board, at, size))
+        beyond = widths_beyond(light, corners.board, sites, corners.blur_px)
+        corners = replace(corners, widths_beyond_px=(float(beyond[0]), float(beyond[1])))
         sites, corners = _with_nearby(light, sites, unseen, corners)
     return drop_inconsistent(corners, sites.at, size)
 
