@@ -8,7 +8,7 @@ import numpy as np
 
 from eposit.arrays import Array, Mask
 from pipelines.detection.board_map import BoardMap, Lift
-from pipelines.detection.circle_grids import find_circle_grid, refine_circles
+from pipelines.detection.circle_grids import find_circle_grid, opencv_centres, refine_circles
 from pipelines.detection.consistency import Corners, check_placed
 from pipelines.detection.corner_sites import CornerSites
 from pipelines.detection.corners import refine_corners
@@ -71,8 +71,9 @@ def place_points(image: Grey, seen: SeenPoints, target: PrintedBoard) -> Corners
 
 
 def check_seen(image: Grey, seen: SeenPoints, placed: Corners, target: PrintedBoard) -> Corners:
-    """The points as OpenCV places them, those of corners after `cv2.cornerSubPix`; checked as our own are."""
-    points = seen.points_px if isinstance(target, CircleGrid) else subpix(image, seen.points_px)
+    """The points as OpenCV places them, by `cv2.cornerSubPix` or, discs, its blobs; checked as our own are."""
+    place = opencv_centres if isinstance(target, CircleGrid) else subpix
+    points = place(image, seen.points_px)
     at, size = target.pattern_points[seen.ids] / target.unit_mm, (image.shape[1], image.shape[0])
     chosen = np.zeros(len(placed.points_px), bool)
     chosen[seen.ids] = True

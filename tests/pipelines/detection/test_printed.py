@@ -7,7 +7,7 @@ from eposit import Camera, Pose
 from eposit.pose import rotation_from_euler
 from pipelines.detection import Detector, detect_points, takes_target
 from pipelines.detection.circle_grids import find_circle_grid
-from pipelines.detection.printed import corner_sites, find_points
+from pipelines.detection.printed import corner_sites
 from pipelines.stages.generate import outline_centroid
 from render.frame import render_frame
 from render.light import Light
@@ -102,7 +102,7 @@ def test_opencv_sees_the_centroid_of_a_disc_and_we_place_its_centre():
     apart = np.linalg.norm(outline - centre, axis=1)
     assert apart.max() > 0.3
     assert np.abs(detect_points(image, target).points_px - centre).max() < 0.02
-    theirs = find_points(image, target).points_px
+    theirs = detect_points(image, target, Detector.OPENCV_SUBPIX).points_px
     assert np.abs((theirs - outline).mean(axis=0)).max() < 0.05  # thresholds of whole pixels
     assert np.linalg.norm(theirs - outline, axis=1).mean() < 0.3 * np.linalg.norm(theirs - centre, axis=1).mean()
 
