@@ -20,6 +20,7 @@ from pipelines.detection.disc_candidates import groups_of_blobs, levels_of_blobs
 from pipelines.detection.disc_lattice import find_grid
 from pipelines.detection.finders import Grey, textured_region
 from pipelines.detection.seen_points import SeenPoints
+from pipelines.detection.time_limit import Check, unlimited
 from render.targets.circle_grid import CircleGrid
 
 MOST_PART = 0.5  # of the picture, for its textured region to be looked at before the whole
@@ -35,22 +36,23 @@ LEAST_NOISE = 1.0 / 12.0  # variance of rounding, grey levels^2
 START_LIMIT = 0.25  # spacings that a centroid may lie from where the map puts it
 
 
-def find_circle_grid(image: Grey, target: CircleGrid) -> SeenPoints | None:
+def find_circle_grid(image: Grey, target: CircleGrid, check_time: Check = unlimited) -> SeenPoints | None:
     """The centres of all discs in the target's order; None if not the whole grid is seen."""
     region = textured_region(image)
     part = image[region.pixels]
     for (x, y), picture in (((region.x, region.y), part), ((0, 0), image)):
         if picture is image or part.size < MOST_PART * image.size:
-            ordered = _find_in(np.ascontiguousarray(picture), target)
+            ordered = _find_in(np.ascontiguousarray(picture), target, check_time)
             if ordered is not None:
                 return SeenPoints(np.arange(len(ordered)), ordered + [x, y], "circles")
     return None
 
 
-def _find_in(image: Grey, target: CircleGrid) -> Array | None:
+def _find_in(image: Grey, target: CircleGrid, check_time: Check) -> Array | None:
     """(n, 2) px of the discs as the first level shows them that shows all."""
     count, distance = target.columns * target.rows, _nearest(target.pattern_points) / target.diameter_mm
     for blobs in levels_of_blobs(image):
+        check_time()
         for points in groups_of_blobs(blobs, distance, count)[:MOST_GROUPS]:
             ways = find_grid(points, target)
             if ways:

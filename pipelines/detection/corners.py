@@ -17,6 +17,7 @@ from pipelines.detection.corner_picture import BLUR, CONTRAST, MEAN, SHAPE, SLOP
 from pipelines.detection.corner_sites import CornerSites
 from pipelines.detection.finders import Grey
 from pipelines.detection.hot_pixels import without_hot_pixels
+from pipelines.detection.time_limit import Check, unlimited
 from pipelines.detection.tone_curve import Light, decoded, measured_exponent
 
 STOP = 0.5  # step, in standard deviations, at which a fit has converged; it is still made
@@ -47,7 +48,7 @@ NEAR = _Pass(steps=8, must_converge=False, reach=0.0)  # enough for a map to sta
 FINAL = _Pass(steps=40, must_converge=True, reach=1.0)
 
 
-def refine_corners(image: Grey, board: BoardMap, sites: CornerSites) -> Corners:
+def refine_corners(image: Grey, board: BoardMap, sites: CornerSites, check_time: Check = unlimited) -> Corners:
     """Fit every corner near where `board` puts it, clear of the circle: once near by, then over all of its edges."""
     at, size = sites.at, (image.shape[1], image.shape[0])
     image = without_hot_pixels(image, board(at), float(np.abs(board.jacobian(at)).max()))
@@ -55,6 +56,7 @@ def refine_corners(image: Grey, board: BoardMap, sites: CornerSites) -> Corners:
     corners, shapes = _fit(light, board, sites, _start_shapes(board, at, measured_blur(light, board, sites)), NEAR)
     exponent = 0.0
     for _ in range(2 if len(at) < FEW else 1):
+        check_time()
         good = corners.consistent
         if np.mean(~good) > 0.5:
             return corners

@@ -27,6 +27,7 @@ from pipelines.detection.saddles import find_saddles, smooth
 from pipelines.detection.sampling import Level
 from pipelines.detection.square_look import look_at_squares
 from pipelines.detection.statuses import PointStatus
+from pipelines.detection.time_limit import Check, unlimited
 from render.targets.chessboard import Chessboard
 
 MOST_PIECES = 3  # of a level's lattices that are looked at, the largest
@@ -64,14 +65,16 @@ class SeenLattice:
         return self.status in TOLD and self.side_px > ENOUGH_PX * 2.0 * scale
 
 
-def find_lattice(image: NDArray[np.uint8], target: AnyChessboard) -> SeenLattice | None:
+def find_lattice(image: NDArray[np.uint8], target: AnyChessboard, check_time: Check = unlimited) -> SeenLattice | None:
     """The board's corners as the level shows them that shows most; None if no level shows a lattice."""
     best: SeenLattice | None = None
     whole = target.inner[0] * target.inner[1]
     for level in levels(image):
         if best is not None and best.is_sharp_at(level.scale):
             continue
+        check_time()
         for seen in _seen(level, target):
+            check_time()
             if seen.is_better_than(best):
                 best = seen
         if best is not None and best.status == PointStatus.OK and best.count == whole:
