@@ -28,10 +28,13 @@ MOST_GROUPS = 12  # of a level's blobs that are looked at, the smallest that may
 WHITE_QUANTILE = 0.9  # of the grey values around a disc
 LEAST_REACH_PX = 3.0
 OPENCV_PIXELS, OPENCV_AREA_PX = 1.2e6, 12.0  # of the picture that OpenCV's blobs are looked for in, and of a blob
+MOST_INSIDE = 1.25  # blobs within a grid's outline for each disc of it; among those of a texture there are many more
 ROUNDS = 3  # of a map through the centres, and centres through the map
 RIM_STEPS = 64
 CLEAR = 0.92  # of the way to the next disc's rim that a disc's window may reach
 LEAST_WHITE = 12  # pixels of the window that see white alone
+MOST_UNEVEN = 0.35  # of the contrast: root mean square of that white; a black square's corners make it more
+MOST_DARK = 0.25  # of the places between the discs; all are white, but for clutter before the board
 LEAST_NOISE = 1.0 / 12.0  # variance of rounding, grey levels^2
 START_LIMIT = 0.25  # spacings that a centroid may lie from where the map puts it
 
@@ -55,7 +58,7 @@ def _find_in(image: Grey, target: CircleGrid, check_time: Check) -> Array | None
         check_time()
         for points in groups_of_blobs(blobs, distance, count)[:MOST_GROUPS]:
             ways = find_grid(points, target)
-            if ways:
+            if ways and blobs.inside(ways[0]) <= MOST_INSIDE * count:
                 return _outline_centres(image, _upright(ways, target))
     return None
 
@@ -144,8 +147,22 @@ def refine_circles(image: Grey, board: BoardMap, target: CircleGrid, unit_mm: fl
         points = centroids + _centre_offsets(board, at, radius)
         board = BoardMap.fit(at, points, size, weights, board)
     contrast = float(np.median([blob.contrast for blob, use in zip(blobs, good, strict=True) if use]))
+    good &= _is_white_between(image, board, at, contrast)
     covariance[~good] = np.eye(2)
     return drop_inconsistent(Corners(points, covariance, good, float("nan"), contrast, board), at, size)
+
+
+def _is_white_between(image: Grey, board: BoardMap, at: Array, contrast: float) -> bool:
+    """Whether it is white at the places between the discs that are farthest from them, where a texture has others."""
+    low, high = at.min(axis=0), at.max(axis=0)
+    steps = (np.arange(low[k], high[k] + 0.25, 0.5) for k in range(2))
+    sites = np.stack(np.meshgrid(*steps), axis=-1).reshape(-1, 2)
+    away, nearest = (np.asarray(part) for part in cKDTree(at).query(sites))
+    far = away > 0.9 * away.max()
+    size = np.array(image.shape[::-1]) - 1.0
+    places, discs = (np.rint(np.clip(board(some), 0.0, size)).astype(int) for some in (sites[far], at[nearest[far]]))
+    white, black = (image[place[:, 1], place[:, 0]].astype(np.float64) for place in (places, discs))
+    return bool(np.mean(white < black + 0.5 * contrast) < MOST_DARK)
 
 
 def _nearest(at: Array) -> float:
@@ -191,8 +208,9 @@ def _blob(image: Grey, board: BoardMap, place: Array, radius: float, window: flo
     dark = 1.0 - grey / np.maximum(light, 1.0)
     total = dark.sum()
     middle = distance < 0.5 * radius
-    if total <= 0.0 or not np.any(middle):
+    contrast = float(np.median((light - grey)[middle])) if np.any(middle) else 0.0
+    if total <= 0.0 or np.sqrt(noise) > MOST_UNEVEN * contrast:
         return none
     mean = dark @ offset / total
     spread = (offset - mean) / np.maximum(light, 1.0)[:, None]
-    return _Blob(centre + mean, noise * spread.T @ spread / total**2, float(np.median((light - grey)[middle])))
+    return _Blob(centre + mean, noise * spread.T @ spread / total**2, contrast)

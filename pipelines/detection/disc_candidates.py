@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+from scipy.spatial import ConvexHull, cKDTree
 
 from eposit.arrays import Array
 from pipelines.detection.grey_picture import Grey
@@ -30,7 +30,7 @@ LEAST_AREA_PX, MOST_SIDE_PX = 6, 40
 FILLED = (0.3, 0.95)  # of the upright rectangle around it: a slanted ellipse has little, a disc 0.79
 SMALL_PX = 6  # longer side of one that may be a whole rectangle of pixels
 MOST_OBLONG = 4.0  # longer over shorter side of that rectangle
-MOST_BLOBS = 20_000  # of a level, the darkest for their surroundings
+MOST_BLOBS = 20_000  # of a level among which a grid is looked for, the darkest for their surroundings
 NEIGHBOURS = 8  # nearest blobs among which a blob's neighbours are
 NEAR = (0.25, 2.0)  # distance of neighbours over what the grid says for discs of that size; a tilt changes both
 ALIKE = 1.7  # most ratio of neighbours' sizes
@@ -41,10 +41,20 @@ class Blobs(NamedTuple):
 
     points: Array  # (n, 2) px
     sizes: Array  # (n,) diameters of discs of their areas, px
+    count: int  # of those that a grid is looked for among: the first
+
+    def inside(self, discs: Array) -> int:
+        """Number of the blobs of discs' size within the outlines of discs (k, 2) px."""
+        outline = discs[ConvexHull(discs).vertices]  # in the direction in which x turns to y
+        along = np.roll(outline, -1, axis=0) - outline
+        away = self.points[:, None] - outline
+        within = np.all(along[:, 0] * away[..., 1] - along[:, 1] * away[..., 0] >= -1e-6, axis=1)
+        size = np.median(self.sizes[np.asarray(cKDTree(self.points).query(discs)[1])])
+        return int(np.sum(within & (self.sizes < ALIKE * size) & (size < ALIKE * self.sizes)))
 
 
 def levels_of_blobs(image: Grey) -> Iterator[Blobs]:
-    """The blobs of a picture (height, width), at most `MOST_BLOBS` a level, from the largest to the smallest."""
+    """The blobs of a picture (height, width), from the largest to the smallest; the first ones are the darkest."""
     if min(image.shape) < LEAST_PICTURE_PX:
         return
     finest = int(np.ceil(np.sqrt(image.size / MOST_PIXELS)))
@@ -67,14 +77,14 @@ def _find_blobs(image: Grey, scale: int) -> Blobs:
     mask = cv2.compare(depth, _least_depth(depth), cv2.CMP_GT)
     count, _, stats, centroids = cv2.connectedComponentsWithStats(mask, connectivity=4, ltype=cv2.CV_32S)
     if count < 2:
-        return Blobs(np.empty((0, 2)), np.empty(0))
+        return Blobs(np.empty((0, 2)), np.empty(0), 0)
     good = np.flatnonzero(_look_like_discs(stats[1:])) + 1  # the first is what is not dark
     points, areas = centroids[good], stats[good, cv2.CC_STAT_AREA]
     if len(good) > MOST_BLOBS:
         column, row = np.rint(points).astype(int).T
-        darkest = np.sort(np.argsort(-depth[row, column].astype(int), kind="stable")[:MOST_BLOBS])
+        darkest = np.argsort(-depth[row, column].astype(int), kind="stable")
         points, areas = points[darkest], areas[darkest]
-    return Blobs((points + 0.5) * scale - 0.5, 2.0 * np.sqrt(areas / np.pi) * scale)
+    return Blobs((points + 0.5) * scale - 0.5, 2.0 * np.sqrt(areas / np.pi) * scale, min(len(good), MOST_BLOBS))
 
 
 def _least_depth(depth: Grey) -> Grey:
@@ -101,16 +111,16 @@ def groups_of_blobs(blobs: Blobs, distance: float, least: int) -> list[Array]:
 
     distance: of a grid's neighbouring discs, in diameters.
     """
-    n = len(blobs.points)
+    n, points, sizes = blobs.count, blobs.points[: blobs.count], blobs.sizes[: blobs.count]
     if n < max(least, NEIGHBOURS + 1):
-        return [blobs.points] if least <= n else []
-    far, other = (np.asarray(part)[:, 1:] for part in cKDTree(blobs.points).query(blobs.points, k=NEIGHBOURS + 1))
-    own, size = np.repeat(np.arange(n)[:, None], NEIGHBOURS, axis=1), blobs.sizes[:, None]
+        return [points] if least <= n else []
+    far, other = (np.asarray(part)[:, 1:] for part in cKDTree(points).query(points, k=NEIGHBOURS + 1))
+    own, size = np.repeat(np.arange(n)[:, None], NEIGHBOURS, axis=1), sizes[:, None]
     ratio = far / (distance * size)
     near = (ratio > NEAR[0]) & (ratio < NEAR[1])
-    near &= (blobs.sizes[other] < ALIKE * size) & (size < ALIKE * blobs.sizes[other])
+    near &= (sizes[other] < ALIKE * size) & (size < ALIKE * sizes[other])
     links = coo_array((np.ones(int(near.sum())), (own[near], other[near])), shape=(n, n))
     group = np.asarray(connected_components(links, directed=False)[1])
-    sizes = np.bincount(group)
-    fits = np.flatnonzero(sizes >= least)
-    return [blobs.points[group == k] for k in fits[np.argsort(sizes[fits], kind="stable")]]
+    members = np.bincount(group)
+    fits = np.flatnonzero(members >= least)
+    return [points[group == k] for k in fits[np.argsort(members[fits], kind="stable")]]

@@ -47,8 +47,15 @@ def test_of_too_many_blobs_the_darkest_are_kept(monkeypatch):
     for x, y in centres:
         cv2.circle(noise, (x, y), 6, 10, -1)
     blobs = list(levels_of_blobs(noise))[-1]
-    assert len(blobs.points) == 12
-    assert {tuple(np.rint(point).astype(int)) for point in blobs.points} == set(centres)
+    assert blobs.count == 12 < len(blobs.points)
+    assert {tuple(np.rint(point).astype(int)) for point in blobs.points[:12]} == set(centres)
+
+
+def test_blobs_within_an_outline_are_counted_but_for_those_of_other_sizes():
+    discs = np.stack(np.meshgrid(np.arange(5.0), np.arange(4.0)), axis=-1).reshape(-1, 2) * 20.0
+    others = np.array([[30.0, 30.0], [50.0, 30.0], [-30.0, 30.0], [10.0, 70.0]])  # two within
+    sizes = np.concatenate((np.full(20, 8.0), [8.0, 3.0, 8.0, 8.0]))
+    assert Blobs(np.concatenate((discs, others)), sizes, 20).inside(discs) == 21
 
 
 def test_blobs_are_grouped_with_neighbours_of_their_size_and_the_smaller_group_comes_first():
@@ -56,10 +63,10 @@ def test_blobs_are_grouped_with_neighbours_of_their_size_and_the_smaller_group_c
     row = np.stack((np.arange(14.0) * 20.0, np.full(14, 500.0)), axis=1)
     large = np.array([[30.0, 45.0], [70.0, 25.0]])  # in the grid, of other sizes
     points, sizes = np.concatenate((grid, row, large)), np.repeat([10.0, 30.0], [44, 2])
-    groups = groups_of_blobs(Blobs(points, sizes), 2.0, 10)
+    groups = groups_of_blobs(Blobs(points, sizes, len(points)), 2.0, 10)
     assert [len(group) for group in groups] == [14, 30]
     np.testing.assert_array_equal(groups[1], grid)
-    assert [len(group) for group in groups_of_blobs(Blobs(points, sizes), 2.0, 20)] == [30]
+    assert [len(group) for group in groups_of_blobs(Blobs(points, sizes, len(points)), 2.0, 20)] == [30]
 
 
 def test_pictures_of_any_size_are_looked_at():

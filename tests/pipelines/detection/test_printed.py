@@ -93,6 +93,21 @@ def test_a_symmetric_grid_is_read_as_standing_upright():
     assert np.abs(seen.points_px - truth[::-1]).max() < 1.0
 
 
+def test_discs_of_a_texture_and_black_squares_are_no_grid():
+    """Every other disc of a texture lies as those of an asymmetric grid do, and so do a chessboard's black squares."""
+    target = CircleGrid()
+    discs = target.pattern_points / target.spacing_mm * 24.0 + 60.0
+    y, x = np.mgrid[0:360, 0:280]
+    apart = np.hypot((x - 12) % 24 - 12, (y - 12) % 24 - 12)
+    texture = np.where(apart < 7.0, 30, 200).astype(np.uint8)
+    assert set(detect_points(texture, target).status) == {"board_not_found"}
+    squares = np.full((360, 280), 200, np.uint8)
+    for column, row in np.rint(discs).astype(int):
+        squares[row - 12 : row + 12, column - 12 : column + 12] = 30
+    assert find_circle_grid(squares, target) is not None
+    assert set(detect_points(squares, target).status) == {"corners_inconsistent"}
+
+
 def test_opencv_sees_the_centroid_of_a_disc_and_we_place_its_centre():
     target = CircleGrid(columns=3, rows=5, spacing_mm=120.0, diameter_mm=100.0)
     where = pose(target)
