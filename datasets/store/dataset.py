@@ -34,6 +34,7 @@ from datasets.store.refusals import SHARD_NAME, damaged, foreign, missing, refus
 from datasets.store.shard_file import (
     DIGEST_KEY,
     PLACE_KEY,
+    PROVISIONAL_KEY,
     RECIPE_KEY,
     UNREADABLE,
     VERSION_KEY,
@@ -73,25 +74,34 @@ class Dataset:
         return self.shard_path(table, self.index_of(path), count, variant)
 
     def is_done(self, path: Path) -> bool:
-        """Whether a shard of this recipe is there; its rows are checked by who reads them.
+        """Whether a shard of this recipe is there for good; its rows are checked by who reads them.
 
         Raises:
             UserError: it may not be read, or its version cannot be.
         """
+        footer = self._footer(path)
+        return footer.get(RECIPE_KEY) == self.recipe.digest().encode() and PROVISIONAL_KEY not in footer
+
+    def is_provisional(self, path: Path) -> bool:
+        """Whether a shard is there that the next run makes again. Errors as `is_done`."""
+        return PROVISIONAL_KEY in self._footer(path)
+
+    def _footer(self, path: Path) -> dict[bytes, bytes]:
+        """Keys and values of a shard's footer; none of a file that is not there or cannot be read as one."""
         if not path.is_file():
-            return False
+            return {}
         try:
             footer = pq.read_metadata(path).metadata or {}
         except PermissionError:
             raise unreadable(path) from None
         except UNREADABLE:
-            return False
+            return {}
         if VERSION_KEY in footer and version_of(footer) not in READABLE:
             raise unsupported(path, version_of(footer), READABLE)
-        return footer.get(RECIPE_KEY) == self.recipe.digest().encode()
+        return footer
 
-    def write_shard(self, path: Path, rows: pa.Table) -> None:
-        """Write one shard atomically.
+    def write_shard(self, path: Path, rows: pa.Table, *, is_provisional: bool = False) -> None:
+        """Write one shard atomically. is_provisional: whether the next run is to make it again.
 
         Raises:
             UserError: the disk or its permissions refuse.
@@ -103,6 +113,8 @@ class Dataset:
             DIGEST_KEY.decode(): table_digest(table),
             PLACE_KEY.decode(): place_of(path),
         }
+        if is_provisional:
+            footer[PROVISIONAL_KEY.decode()] = "yes"
         try:
             with replace_atomically(path) as temporary:
                 write_rows(temporary, path.parent.name, table, footer)

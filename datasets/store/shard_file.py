@@ -25,6 +25,7 @@ from datasets.store.texts import longest
 
 RECIPE_KEY, VERSION_KEY, DIGEST_KEY = b"recipe", b"schema_version", b"content"
 PLACE_KEY = b"place"  # table and name of the file, so that a shard under another's name is known
+PROVISIONAL_KEY = b"provisional"  # in the footer of a shard that the next run makes again
 CHECKS_KEY = b"checks"  # a digest of each column in their order, then one of the other keys and values
 MEANINGS_KEY = "meanings"  # column name to meaning, JSON
 HUGGINGFACE_KEY = "huggingface"  # which columns are images, as Hugging Face's `datasets` reads it

@@ -61,6 +61,13 @@ IgnoreDisk = Annotated[
 ]
 
 DetectorName = Annotated[str, typer.Option("--detector", help="edge-fit (ours), opencv-subpix or opencv-sb.")]
+DetectSeconds = Annotated[
+    float,
+    typer.Option(
+        metavar="SECONDS",
+        help="Processor time that the detection of one picture may take; bounds on its work end it long before.",
+    ),
+]
 OWN = "or your own as package.module:function."
 SOLVERS_HELP = (
     "best, centred, eposit, posit, opnp, gpnpf, pnpfr, released, opencv-sqpnp, opencv-epnp, opencv-iterative, "

@@ -31,6 +31,7 @@ def run(
     solver: o.MoreSolvers = None,
     estimator: o.MoreEstimators = None,
     timeout: o.Timeout = 300.0,
+    detect_seconds: o.DetectSeconds = 2.0,
     workers: o.Workers = 1,
     engine: o.EngineName = "local",
     ray_address: o.RayAddress = None,
@@ -45,7 +46,7 @@ def run(
     from pipelines.stages.kernels import compiled_ahead
     from pipelines.stages.settings import System, run_settings, settings_of
 
-    execution = _execution(engine, workers, ray_address, shard, quiet, timeout)
+    execution = _execution(engine, workers, ray_address, shard, quiet, timeout, detect_seconds)
     more, systems = settings_of(solver or []), estimator or []
     for name in solver or []:
         solver_of(name, limit_s=timeout)  # what cannot be called is told before anything is rendered
@@ -116,6 +117,7 @@ def generate(
 def detect(
     folder: o.Folder,
     detector: o.DetectorName = "edge-fit",
+    detect_seconds: o.DetectSeconds = 2.0,
     workers: o.Workers = 1,
     engine: o.EngineName = "local",
     ray_address: o.RayAddress = None,
@@ -125,7 +127,7 @@ def detect(
     """Find corners and circle in the images; each detector's points stay beside the others'."""
     from pipelines.stages import run as stages
 
-    execution = _execution(engine, workers, ray_address, shard, quiet)
+    execution = _execution(engine, workers, ray_address, shard, quiet, detect_seconds=detect_seconds)
     with writing(folder, shared=not execution.part.is_whole) as dataset:
         stages.run_detect(dataset, execution, detector)
         finish(execution)
@@ -257,7 +259,13 @@ def frame(folder: o.Folder, frame_id: o.FrameNumber, out: o.Png = Path("frame.pn
 
 
 def _execution(
-    engine: str, workers: int, ray_address: str | None, shard: str | None, quiet: bool, limit_s: float = 300.0
+    engine: str,
+    workers: int,
+    ray_address: str | None,
+    shard: str | None,
+    quiet: bool,
+    limit_s: float = 300.0,
+    detect_seconds: float = 2.0,
 ) -> Execution:
     """What the options about where and how much mean.
 
@@ -266,12 +274,13 @@ def _execution(
     """
     from pipelines.adapters.process import check_limit
     from pipelines.stages.missing import Execution
+    from pipelines.stages.settings import check_detect_seconds
 
     check_limit(limit_s)
-
+    check_detect_seconds(detect_seconds)
     part = part_of(shard)
     place = engine_of(engine, workers, ray_address)
-    return Execution(place, Console(quiet=quiet), part, limit_s=limit_s, goes_on=True)
+    return Execution(place, Console(quiet=quiet), part, limit_s=limit_s, detect_seconds=detect_seconds, goes_on=True)
 
 
 def _report(dataset: Dataset) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -20,6 +21,7 @@ from pipelines.detection.grey_picture import Grey, grey_picture
 from pipelines.detection.printed import check_seen, find_points, place_points
 from pipelines.detection.seen_points import SeenPoints
 from pipelines.detection.statuses import STATUS_TYPE, PointStatus
+from pipelines.detection.time_limit import Check, TimeLimit, TooLateError
 from pipelines.detection.tone_curve import decoded
 from render.targets.chessboard import Chessboard
 from render.targets.kinds import AnyTarget
@@ -49,10 +51,14 @@ class Detection:
     exponent: float = 1.0  # of the picture's tone curve, see `tone_curve`; 1 if light was found
 
 
-def detect_points(image: NDArray[np.generic], target: AnyTarget, detector: str = Detector.EDGE_FIT) -> Detection:
+def detect_points(
+    image: NDArray[np.generic], target: AnyTarget, detector: str = Detector.EDGE_FIT, seconds: float = math.inf
+) -> Detection:
     """The target's points in a picture (height, width) of grey or (height, width, 3 or 4) of colour.
 
     The picture has 8 or 16 bits or floating point; see `grey_picture`.
+
+    seconds: of processor time, after which all points are `too_late`; see `pipelines.detection.time_limit`.
 
     Raises:
         ValueError: a picture of another kind, an unknown detector, or one that does not take the target.
@@ -61,10 +67,14 @@ def detect_points(image: NDArray[np.generic], target: AnyTarget, detector: str =
         raise ValueError(f"unknown detector {detector!r}; choose one of {', '.join(Detector)}")
     if not takes_target(detector, target):
         raise ValueError(f"detector {str(detector)!r} finds chessboards only; choose another for {target.pattern!r}")
+    check_time = TimeLimit(seconds).check
     grey = grey_picture(image)
-    if isinstance(target, Chessboard):
-        return _detect_chessboard(grey, target, detector)
-    return _detect_printed(grey, target, detector)
+    try:
+        if isinstance(target, Chessboard):
+            return _detect_chessboard(grey, target, detector, check_time)
+        return _detect_printed(grey, target, detector, check_time)
+    except TooLateError:
+        return _nothing(len(target.points), PointStatus.TOO_LATE, "")
 
 
 def takes_target(detector: str, target: AnyTarget) -> bool:
@@ -72,13 +82,13 @@ def takes_target(detector: str, target: AnyTarget) -> bool:
     return detector != Detector.OPENCV_SB or isinstance(target, Chessboard)
 
 
-def _detect_printed(image: Grey, target: PrintedBoard, detector: str) -> Detection:
+def _detect_printed(image: Grey, target: PrintedBoard, detector: str, check_time: Check) -> Detection:
     count = len(target.points)
-    seen = find_points(image, target)
+    seen = find_points(image, target, check_time)
     if isinstance(seen, PointStatus):
         return _nothing(count, seen, "")
     try:
-        placed = place_points(image, seen, target)
+        placed = place_points(image, seen, target, check_time)
     except np.linalg.LinAlgError:  # points that no camera could see
         return _nothing(count, PointStatus.CORNERS_INCONSISTENT, seen.finder)
     if detector == Detector.OPENCV_SUBPIX and np.any(placed.consistent):
@@ -93,20 +103,22 @@ def _detect_printed(image: Grey, target: PrintedBoard, detector: str) -> Detecti
     )
 
 
-def _detect_chessboard(image: Grey, target: Chessboard, detector: str) -> Detection:
+def _detect_chessboard(image: Grey, target: Chessboard, detector: str, check_time: Check) -> Detection:
     """Corners and circle."""
     count = len(target.points)
-    seen = find_sector_based(image, target) if detector == Detector.OPENCV_SB else find_board(image, target)
+    find = find_sector_based if detector == Detector.OPENCV_SB else find_board
+    seen = find(image, target, check_time)
     if isinstance(seen, PointStatus):
         return _nothing(count, seen, "")
     try:
-        corners = _corners(image, seen, target, detector)
+        corners = _corners(image, seen, target, detector, check_time)
     except np.linalg.LinAlgError:  # corners that no camera could see
         return _nothing(count, PointStatus.CORNERS_INCONSISTENT, seen.finder)
     if too_many_bad(corners.consistent[: len(seen.ids)]):
         return _nothing(count, PointStatus.CORNERS_INCONSISTENT, seen.finder)
     ids = np.append(seen.ids, _unseen(seen, target))[: len(corners.consistent)]
     misfit = misfit_squares(corners, grid(target.inner)[ids])
+    check_time()
     light = decoded(image, corners.exponent)
     circle = find_circle(light, corners, target, misfit)
     points, covariance = np.full((count, 2), np.nan), np.full((count, 2, 2), np.nan)
@@ -121,17 +133,16 @@ def _detect_chessboard(image: Grey, target: Chessboard, detector: str) -> Detect
     return Detection(points, covariance, status, seen.finder, corners.blur_px, corners.exponent)
 
 
-def _corners(image: Grey, seen: SeenPoints, target: Chessboard, detector: str) -> Corners:
+def _corners(image: Grey, seen: SeenPoints, target: Chessboard, detector: str, check_time: Check) -> Corners:
     """The corners that were seen, in the order of their ids, placed by our fit or by OpenCV.
 
     By ours, those that were not seen follow.
     """
     size = (image.shape[1], image.shape[0])
     every = chessboard_sites(target)
-    sites, unseen = every.chosen(seen.ids), every.chosen(_unseen(seen, target))
-    fitted = refine_corners(
-        image, first_map(seen, size, target), sites, unseen if detector == Detector.EDGE_FIT else None
-    )
+    sites = every.chosen(seen.ids)
+    unseen = every.chosen(_unseen(seen, target)) if detector == Detector.EDGE_FIT else None
+    fitted = refine_corners(image, first_map(seen, size, target), sites, unseen, check_time)
     if detector == Detector.EDGE_FIT or not np.any(fitted.consistent):
         return fitted
     placed = subpix(image, seen.points_px) if detector == Detector.OPENCV_SUBPIX else seen.points_px

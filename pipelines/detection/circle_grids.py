@@ -1,4 +1,4 @@
-"""Grids of discs in an image: found by OpenCV, placed by us.
+"""Grids of discs in an image.
 
 A disc's darkness is summed over the pixels around it; their centroid is that of the disc's image, whatever the blur,
 as a point spread only spreads it. The centroid of a projected disc is not the projection of its centre: by how much it
@@ -16,74 +16,101 @@ from scipy.spatial import cKDTree
 from eposit.arrays import Array
 from pipelines.detection.board_map import BoardMap
 from pipelines.detection.consistency import Corners, drop_inconsistent
-from pipelines.detection.disc_candidates import MOST_BLOBS, find_blobs, likely_discs
+from pipelines.detection.disc_candidates import groups_of_blobs, levels_of_blobs
+from pipelines.detection.disc_lattice import find_grid
 from pipelines.detection.finders import Grey, textured_region
 from pipelines.detection.seen_points import SeenPoints
+from pipelines.detection.time_limit import Check, unlimited
 from render.targets.circle_grid import CircleGrid
 
-DOT_SCALE, DOT_PIXELS = 2.0, 5e6  # pixels of the picture of dots to one of the picture, and of the whole, at most
-DOT_REACH, DOT_MARGIN = 2, 20.0  # px of a dot to each side, and of the picture around the dots
-CLUSTERING = cv2.CALIB_CB_CLUSTERING
+MOST_PART = 0.5  # of the picture, for its textured region to be looked at before the whole
+MOST_GROUPS = 12  # of a level's blobs that are looked at, the smallest that may hold the grid
+WHITE_QUANTILE = 0.9  # of the grey values around a disc
+LEAST_REACH_PX = 3.0
+OPENCV_PIXELS, OPENCV_AREA_PX = 1.2e6, 12.0  # of the picture that OpenCV's blobs are looked for in, and of a blob
+MOST_INSIDE = 1.25  # blobs within a grid's outline for each disc of it; among those of a texture there are many more
 ROUNDS = 3  # of a map through the centres, and centres through the map
 RIM_STEPS = 64
 CLEAR = 0.92  # of the way to the next disc's rim that a disc's window may reach
 LEAST_WHITE = 12  # pixels of the window that see white alone
+MOST_UNEVEN = 0.35  # of the contrast: root mean square of that white; a black square's corners make it more
+MOST_DARK = 0.25  # of the places between the discs; all are white, but for clutter before the board
 LEAST_NOISE = 1.0 / 12.0  # variance of rounding, grey levels^2
 START_LIMIT = 0.25  # spacings that a centroid may lie from where the map puts it
 
 
-def find_circle_grid(image: Grey, target: CircleGrid) -> SeenPoints | None:
-    """The centres of all discs in the target's order, as OpenCV sees them; None if it does not see the whole grid."""
+def find_circle_grid(image: Grey, target: CircleGrid, check_time: Check = unlimited) -> SeenPoints | None:
+    """The centres of all discs in the target's order; None if not the whole grid is seen."""
     region = textured_region(image)
-    blobs = find_blobs(np.ascontiguousarray(image[region.pixels]))
-    count, size = target.columns * target.rows, (target.columns, target.rows)
-    points = likely_discs(blobs, count, _nearest(target.pattern_points) / target.diameter_mm)
-    if len(points) < count:
-        return None
-    drawn, first_px, scale = _dots(points)
-    shape = cv2.CALIB_CB_ASYMMETRIC_GRID if target.asymmetric else cv2.CALIB_CB_SYMMETRIC_GRID
-    searches = (shape, shape | CLUSTERING) if len(points) <= MOST_BLOBS else (shape | CLUSTERING,)
-    for flags in searches:
-        found, centres = cv2.findCirclesGrid(drawn, size, flags=flags, blobDetector=_dot_detector())
-        if found:
-            places = np.asarray(centres, np.float64).reshape(-1, 2) / scale + first_px
-            grid = points[np.asarray(cKDTree(points).query(places)[1])].reshape(target.rows, target.columns, 2)
-            ordered = _upright(grid, target).reshape(-1, 2) + [region.x, region.y]
-            return SeenPoints(np.arange(len(ordered)), ordered, "circles")
+    part = image[region.pixels]
+    for (x, y), picture in (((region.x, region.y), part), ((0, 0), image)):
+        if picture is image or part.size < MOST_PART * image.size:
+            ordered = _find_in(np.ascontiguousarray(picture), target, check_time)
+            if ordered is not None:
+                return SeenPoints(np.arange(len(ordered)), ordered + [x, y], "circles")
     return None
 
 
-def _dots(points: Array) -> tuple[Grey, Array, float]:
-    """A picture of the points as black dots, where it begins, px, and its pixels to one.
-
-    OpenCV's search of a grid takes a picture only, and finds its blobs anew: dots are found at once.
-    """
-    low, high = points.min(axis=0) - DOT_MARGIN, points.max(axis=0) + DOT_MARGIN
-    scale = min(DOT_SCALE, float(np.sqrt(DOT_PIXELS / np.prod(high - low))))
-    width, height = np.ceil((high - low) * scale).astype(int)
-    drawn = np.full((height, width), 255, np.uint8)
-    for x, y in np.rint((points - low) * scale).astype(int):
-        drawn[y - DOT_REACH : y + DOT_REACH + 1, x - DOT_REACH : x + DOT_REACH + 1] = 0
-    return drawn, low, scale
+def _find_in(image: Grey, target: CircleGrid, check_time: Check) -> Array | None:
+    """(n, 2) px of the discs as the first level shows them that shows all."""
+    count, distance = target.columns * target.rows, _nearest(target.pattern_points) / target.diameter_mm
+    for blobs in levels_of_blobs(image):
+        check_time()
+        for points in groups_of_blobs(blobs, distance, count)[:MOST_GROUPS]:
+            ways = find_grid(points, target)
+            if ways and blobs.inside(ways[0]) <= MOST_INSIDE * count:
+                return _outline_centres(image, _upright(ways, target))
+    return None
 
 
-def _dot_detector() -> cv2.SimpleBlobDetector:
+def _outline_centres(image: Grey, points: Array) -> Array:
+    """(n, 2) px of discs moved to the centroids of what is dark in one piece there; as they are where nothing is."""
+    moved = points.copy()
+    for k, (point, (left, top, window)) in enumerate(zip(points, _windows(image, points), strict=True)):
+        column, row = np.rint(point).astype(int) - (left, top)
+        if not (0 < row < window.shape[0] and 0 < column < window.shape[1]):
+            continue
+        middle = 0.5 * (float(window[row, column]) + float(np.quantile(window, WHITE_QUANTILE)))
+        _, labels, _, centroids = cv2.connectedComponentsWithStats(np.asarray(window < middle, np.uint8))
+        if labels[row, column]:
+            moved[k] = centroids[labels[row, column]] + (left, top)
+    return moved
+
+
+def opencv_centres(image: Grey, points: Array) -> Array:
+    """(n, 2) px of discs as `cv2.SimpleBlobDetector` places them, reduced if it is large; NaN if not at all."""
+    nearest = np.asarray(cKDTree(points).query(points, k=2)[0])[:, 1]
+    low = np.maximum(points.min(axis=0) - nearest.max(), 0.0).astype(int)
+    high = (points.max(axis=0) + nearest.max()).astype(int)
+    part = image[low[1] : high[1], low[0] : high[0]]
+    scale = int(np.ceil(np.sqrt(part.size / OPENCV_PIXELS)))
+    width, height = part.shape[1] // scale, part.shape[0] // scale
+    level = cv2.resize(part[: height * scale, : width * scale], (width, height), interpolation=cv2.INTER_AREA)
     parameters = cv2.SimpleBlobDetector.Params()
-    parameters.minThreshold, parameters.maxThreshold, parameters.thresholdStep = 100.0, 200.0, 50.0
-    parameters.minRepeatability, parameters.minDistBetweenBlobs = 1, 1.0
-    parameters.filterByArea = parameters.filterByCircularity = parameters.filterByConvexity = False
-    parameters.filterByInertia = False
-    return cv2.SimpleBlobDetector.create(parameters)
+    parameters.minArea, parameters.maxArea = OPENCV_AREA_PX, level.size / 4.0
+    parameters.minDistBetweenBlobs = np.sqrt(OPENCV_AREA_PX)
+    found = cv2.SimpleBlobDetector.create(parameters).detect(np.asarray(level, np.uint8))
+    centres = (np.array([blob.pt for blob in found]).reshape(-1, 2) + 0.5) * scale - 0.5 + low
+    if not len(centres):
+        return np.full(points.shape, np.nan)
+    distance, which = (np.asarray(part) for part in cKDTree(centres).query(points))
+    return np.where((distance < 0.5 * nearest)[:, None], centres[which], np.nan)
 
 
-def _upright(grid: Array, target: CircleGrid) -> Array:
-    """Centres (rows, columns, 2) so that x to y turns as the image's axes do; x to the right where that is open."""
-    if target.asymmetric and target.tells_orientation:
-        return grid
-    ways = [grid, grid[::-1, ::-1]]
-    if grid.shape[0] == grid.shape[1] and not target.asymmetric:
-        ways += [np.rot90(grid), np.rot90(grid, 3)]
-    return max(ways, key=lambda way: float(_direction(way)[0]))
+def _windows(image: Grey, points: Array) -> list[tuple[int, int, Grey]]:
+    """Left, top and pixels of a square around each disc (n, 2) px, which reaches half the way to the nearest other."""
+    nearest = np.asarray(cKDTree(points).query(points, k=2)[0])[:, 1]
+    reach = np.maximum(0.5 * nearest, LEAST_REACH_PX)[:, None]
+    low, high = np.maximum(np.floor(points - reach), 0.0).astype(int), np.ceil(points + reach).astype(int) + 1
+    return [
+        (left, top, np.ascontiguousarray(image[top:bottom, left:right]))
+        for (left, top), (right, bottom) in zip(low.tolist(), high.tolist(), strict=True)
+    ]
+
+
+def _upright(ways: list[Array], target: CircleGrid) -> Array:
+    """Of the ways in which the discs may be the target's that with x to the right in the picture."""
+    return max(ways, key=lambda way: float(_direction(way.reshape(target.rows, target.columns, 2))[0]))
 
 
 def _direction(grid: Array) -> Array:
@@ -120,8 +147,22 @@ def refine_circles(image: Grey, board: BoardMap, target: CircleGrid, unit_mm: fl
         points = centroids + _centre_offsets(board, at, radius)
         board = BoardMap.fit(at, points, size, weights, board)
     contrast = float(np.median([blob.contrast for blob, use in zip(blobs, good, strict=True) if use]))
+    good &= _is_white_between(image, board, at, contrast)
     covariance[~good] = np.eye(2)
     return drop_inconsistent(Corners(points, covariance, good, float("nan"), contrast, board), at, size)
+
+
+def _is_white_between(image: Grey, board: BoardMap, at: Array, contrast: float) -> bool:
+    """Whether it is white at the places between the discs that are farthest from them, where a texture has others."""
+    low, high = at.min(axis=0), at.max(axis=0)
+    steps = (np.arange(low[k], high[k] + 0.25, 0.5) for k in range(2))
+    sites = np.stack(np.meshgrid(*steps), axis=-1).reshape(-1, 2)
+    away, nearest = (np.asarray(part) for part in cKDTree(at).query(sites))
+    far = away > 0.9 * away.max()
+    size = np.array(image.shape[::-1]) - 1.0
+    places, discs = (np.rint(np.clip(board(some), 0.0, size)).astype(int) for some in (sites[far], at[nearest[far]]))
+    white, black = (image[place[:, 1], place[:, 0]].astype(np.float64) for place in (places, discs))
+    return bool(np.mean(white < black + 0.5 * contrast) < MOST_DARK)
 
 
 def _nearest(at: Array) -> float:
@@ -167,8 +208,9 @@ def _blob(image: Grey, board: BoardMap, place: Array, radius: float, window: flo
     dark = 1.0 - grey / np.maximum(light, 1.0)
     total = dark.sum()
     middle = distance < 0.5 * radius
-    if total <= 0.0 or not np.any(middle):
+    contrast = float(np.median((light - grey)[middle])) if np.any(middle) else 0.0
+    if total <= 0.0 or np.sqrt(noise) > MOST_UNEVEN * contrast:
         return none
     mean = dark @ offset / total
     spread = (offset - mean) / np.maximum(light, 1.0)[:, None]
-    return _Blob(centre + mean, noise * spread.T @ spread / total**2, float(np.median((light - grey)[middle])))
+    return _Blob(centre + mean, noise * spread.T @ spread / total**2, contrast)

@@ -17,6 +17,7 @@ from pipelines.detection.corner_picture import BLUR, CONTRAST, MEAN, SHAPE, SLOP
 from pipelines.detection.corner_sites import CornerSites
 from pipelines.detection.finders import Grey
 from pipelines.detection.hot_pixels import without_hot_pixels
+from pipelines.detection.time_limit import Check, unlimited
 from pipelines.detection.tone_curve import Light, decoded, measured_exponent
 
 STOP = 0.5  # step, in standard deviations, at which a fit has converged; it is still made
@@ -50,7 +51,13 @@ SMALL = _Pass(steps=40, must_converge=True, reach=0.0)  # for corners beside wha
 FINAL = _Pass(steps=40, must_converge=True, reach=1.0)
 
 
-def refine_corners(image: Grey, board: BoardMap, sites: CornerSites, unseen: CornerSites | None = None) -> Corners:
+def refine_corners(
+    image: Grey,
+    board: BoardMap,
+    sites: CornerSites,
+    unseen: CornerSites | None = None,
+    check_time: Check = unlimited,
+) -> Corners:
     """Fit every corner near where `board` puts it, clear of the circle: once near by, then over all of its edges.
 
     unseen: further corners of the board; they are looked for where the map through the others puts them, and stand
@@ -62,6 +69,7 @@ def refine_corners(image: Grey, board: BoardMap, sites: CornerSites, unseen: Cor
     corners, shapes = _fit(light, board, sites, _start_shapes(board, at, measured_blur(light, board, sites)), NEAR)
     exponent = 0.0
     for _ in range(2 if len(at) < FEW else 1):
+        check_time()
         good = corners.consistent
         if np.mean(~good) > MOST_LOST:
             return corners

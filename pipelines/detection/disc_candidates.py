@@ -1,11 +1,12 @@
 """Dark blobs in a picture that may be the discs of a grid, at most so many, whatever the picture holds.
 
-OpenCV's blob detector takes time as the pixels, and its search of a grid as the cube of the blobs: 12 s for 800. So
-large pictures are reduced, and of too many blobs only those are kept that have neighbours as the discs of the grid do.
+A blob is what is darker than the mean of its surroundings, in one piece and of about the size that a level of the
+picture is looked at for: the others show in the picture reduced.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import cv2
@@ -13,65 +14,113 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+from scipy.spatial import ConvexHull, cKDTree
 
 from eposit.arrays import Array
 from pipelines.detection.grey_picture import Grey
 
-MOST_PIXELS = 1.2e6  # of the picture in which blobs are looked for; a larger one is reduced
-MOST_BLOBS = 300  # that are given to OpenCV's search, or as many as the grid has discs
-LEAST_AREA_PX = 12.0
+MOST_PIXELS = 2.5e7  # of the finest level: a larger picture is reduced first
+LEAST_PICTURE_PX = 16
+LEAST_LEVEL_PX = 64  # side of the coarsest level, or the picture's own
+SMOOTHING_PX = 0.8  # of a level: noise makes no holes and no specks
+AROUND_PX = 41  # side of the square that a pixel is compared with
+LEAST_DEPTH, LEAST_SHARE = 5, 0.4  # of a dark pixel below its mean: grey values, and of what the darkest there has
+BLOCK_PX, BLOCKS = 8, 5  # side of a block whose darkest pixel is taken, and of the square of blocks
+LEAST_AREA_PX, MOST_SIDE_PX = 6, 40
+FILLED = (0.3, 0.95)  # of the upright rectangle around it: a slanted ellipse has little, a disc 0.79
+SMALL_PX = 6  # longer side of one that may be a whole rectangle of pixels
+MOST_OBLONG = 4.0  # longer over shorter side of that rectangle
+MOST_BLOBS = 20_000  # of a level among which a grid is looked for, the darkest for their surroundings
 NEIGHBOURS = 8  # nearest blobs among which a blob's neighbours are
-NEAR = (0.35, 1.6)  # distance of neighbours over what the grid says for discs of that size; a tilt shortens it
-ALIKE = 1.6  # most ratio of neighbours' sizes
-LEAST_NEIGHBOURS = 2
+NEAR = (0.25, 2.0)  # distance of neighbours over what the grid says for discs of that size; a tilt changes both
+ALIKE = 1.7  # most ratio of neighbours' sizes
 
 
 class Blobs(NamedTuple):
     """n dark blobs."""
 
     points: Array  # (n, 2) px
-    sizes: Array  # (n,) diameters, px
+    sizes: Array  # (n,) diameters of discs of their areas, px
+    count: int  # of those that a grid is looked for among: the first
+
+    def inside(self, discs: Array) -> int:
+        """Number of the blobs of discs' size within the outlines of discs (k, 2) px."""
+        outline = discs[ConvexHull(discs).vertices]  # in the direction in which x turns to y
+        along = np.roll(outline, -1, axis=0) - outline
+        away = self.points[:, None] - outline
+        within = np.all(along[:, 0] * away[..., 1] - along[:, 1] * away[..., 0] >= -1e-6, axis=1)
+        size = np.median(self.sizes[np.asarray(cKDTree(self.points).query(discs)[1])])
+        return int(np.sum(within & (self.sizes < ALIKE * size) & (size < ALIKE * self.sizes)))
 
 
-def find_blobs(image: Grey) -> Blobs:
-    """The blobs of a picture (height, width)."""
-    scale = int(np.ceil(np.sqrt(image.size / MOST_PIXELS)))
+def levels_of_blobs(image: Grey) -> Iterator[Blobs]:
+    """The blobs of a picture (height, width), from the largest to the smallest; the first ones are the darkest."""
+    if min(image.shape) < LEAST_PICTURE_PX:
+        return
+    finest = int(np.ceil(np.sqrt(image.size / MOST_PIXELS)))
+    scale = finest
+    while min(image.shape) // (2 * scale) >= LEAST_LEVEL_PX:
+        scale *= 2
+    while scale >= finest:
+        yield _find_blobs(image, scale)
+        scale //= 2
+
+
+def _find_blobs(image: Grey, scale: int) -> Blobs:
+    """The blobs of the picture reduced by a whole number."""
     height, width = (size // scale for size in image.shape)
     level = image[: height * scale, : width * scale]
     if scale > 1:
         level = np.asarray(cv2.resize(level, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
-    parameters = cv2.SimpleBlobDetector.Params()
-    parameters.minArea, parameters.maxArea = LEAST_AREA_PX, level.size / 4.0
-    parameters.minDistBetweenBlobs = np.sqrt(LEAST_AREA_PX)
-    found = cv2.SimpleBlobDetector.create(parameters).detect(np.ascontiguousarray(level))
-    points = np.array([blob.pt for blob in found]).reshape(-1, 2)
-    return Blobs((points + 0.5) * scale - 0.5, np.array([blob.size for blob in found]) * scale)
+    level = cv2.GaussianBlur(level, (0, 0), SMOOTHING_PX)
+    depth = cv2.subtract(cv2.boxFilter(level, -1, (AROUND_PX, AROUND_PX)), level)
+    mask = cv2.compare(depth, _least_depth(depth), cv2.CMP_GT)
+    count, _, stats, centroids = cv2.connectedComponentsWithStats(mask, connectivity=4, ltype=cv2.CV_32S)
+    if count < 2:
+        return Blobs(np.empty((0, 2)), np.empty(0), 0)
+    good = np.flatnonzero(_look_like_discs(stats[1:])) + 1  # the first is what is not dark
+    points, areas = centroids[good], stats[good, cv2.CC_STAT_AREA]
+    if len(good) > MOST_BLOBS:
+        column, row = np.rint(points).astype(int).T
+        darkest = np.argsort(-depth[row, column].astype(int), kind="stable")
+        points, areas = points[darkest], areas[darkest]
+    return Blobs((points + 0.5) * scale - 0.5, 2.0 * np.sqrt(areas / np.pi) * scale, min(len(good), MOST_BLOBS))
 
 
-def likely_discs(blobs: Blobs, count: int, distance: float) -> Array:
-    """(n, 2) px of the blobs that may be a grid's discs, at most as many as can be searched; none if there are more.
+def _least_depth(depth: Grey) -> Grey:
+    """How dark each pixel must be: a share of what the darkest around it has, so that discs side by side stay apart."""
+    middles = slice(BLOCK_PX // 2, None, BLOCK_PX)
+    blocks = cv2.dilate(depth, np.ones((BLOCK_PX, BLOCK_PX), np.uint8))[middles, middles]
+    most = cv2.dilate(np.ascontiguousarray(blocks), np.ones((BLOCKS, BLOCKS), np.uint8))
+    least = cv2.max(cv2.multiply(most, LEAST_SHARE), LEAST_DEPTH - 1.0)
+    return np.asarray(cv2.resize(least, depth.shape[::-1], interpolation=cv2.INTER_LINEAR), np.uint8)
 
-    count: of the grid's discs. distance: of neighbouring discs, in diameters.
+
+def _look_like_discs(stats: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """(n,) which pieces have the area and the outlines of a disc that is seen from some side."""
+    width, height, area = (
+        stats[:, k].astype(np.float64) for k in (cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT, cv2.CC_STAT_AREA)
+    )
+    longer, shorter, filled = np.maximum(width, height), np.minimum(width, height), area / (width * height)
+    good = (area >= LEAST_AREA_PX) & (longer <= MOST_SIDE_PX) & (longer <= MOST_OBLONG * shorter)
+    return good & (filled > FILLED[0]) & ((filled < FILLED[1]) | (longer <= SMALL_PX))
+
+
+def groups_of_blobs(blobs: Blobs, distance: float, least: int) -> list[Array]:
+    """Blobs (n, 2) px that are joined by neighbours, of at least so many, the smaller groups first.
+
+    distance: of a grid's neighbouring discs, in diameters.
     """
-    most = max(MOST_BLOBS, count)
-    if len(blobs.points) <= most:
-        return blobs.points
-    group = _groups(blobs, distance)
-    sizes = np.bincount(group)
-    fits = np.flatnonzero((sizes >= count) & (sizes <= most))
-    return blobs.points[group == fits[np.argmin(sizes[fits])]] if len(fits) else np.empty((0, 2))
-
-
-def _groups(blobs: Blobs, distance: float) -> NDArray[np.int32]:
-    """(n,) number of the group of each blob: neighbours are in one, and a blob without enough of them is alone."""
-    n = len(blobs.points)
-    far, other = (np.asarray(part)[:, 1:] for part in cKDTree(blobs.points).query(blobs.points, k=NEIGHBOURS + 1))
-    own, size = np.repeat(np.arange(n)[:, None], NEIGHBOURS, axis=1), blobs.sizes[:, None]
+    n, points, sizes = blobs.count, blobs.points[: blobs.count], blobs.sizes[: blobs.count]
+    if n < max(least, NEIGHBOURS + 1):
+        return [points] if least <= n else []
+    far, other = (np.asarray(part)[:, 1:] for part in cKDTree(points).query(points, k=NEIGHBOURS + 1))
+    own, size = np.repeat(np.arange(n)[:, None], NEIGHBOURS, axis=1), sizes[:, None]
     ratio = far / (distance * size)
     near = (ratio > NEAR[0]) & (ratio < NEAR[1])
-    near &= (blobs.sizes[other] < ALIKE * size) & (size < ALIKE * blobs.sizes[other])
-    enough = near.sum(axis=1) >= LEAST_NEIGHBOURS
-    near &= enough[:, None] & enough[other]
+    near &= (sizes[other] < ALIKE * size) & (size < ALIKE * sizes[other])
     links = coo_array((np.ones(int(near.sum())), (own[near], other[near])), shape=(n, n))
-    return np.asarray(connected_components(links, directed=False)[1])
+    group = np.asarray(connected_components(links, directed=False)[1])
+    members = np.bincount(group)
+    fits = np.flatnonzero(members >= least)
+    return [points[group == k] for k in fits[np.argsort(members[fits], kind="stable")]]

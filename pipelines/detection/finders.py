@@ -18,6 +18,7 @@ from pipelines.detection.lattice_growth import centred
 from pipelines.detection.seen_points import SeenPoints
 from pipelines.detection.statuses import PointStatus
 from pipelines.detection.textured_region import textured_region
+from pipelines.detection.time_limit import Check, unlimited
 
 __all__ = ["Grey", "find_board", "find_sector_based", "subpix", "textured_region"]
 
@@ -28,9 +29,9 @@ SUBPIX_WINDOW = (5, 5)
 SUBPIX_STOP = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 40, 1e-3)
 
 
-def find_board(image: Grey, target: AnyChessboard) -> SeenPoints | PointStatus:
+def find_board(image: Grey, target: AnyChessboard, check_time: Check = unlimited) -> SeenPoints | PointStatus:
     """The corners that are seen, or the status of all where it is not known which they are."""
-    lattice = find_lattice(image, target)
+    lattice = find_lattice(image, target, check_time)
     if lattice is None:
         return PointStatus.BOARD_NOT_FOUND
     if lattice.status != PointStatus.OK:
@@ -39,12 +40,12 @@ def find_board(image: Grey, target: AnyChessboard) -> SeenPoints | PointStatus:
     return SeenPoints(lattice.ids, points, LATTICE, lattice.exchanged)
 
 
-def find_sector_based(image: Grey, target: AnyChessboard) -> SeenPoints | PointStatus:
+def find_sector_based(image: Grey, target: AnyChessboard, check_time: Check = unlimited) -> SeenPoints | PointStatus:
     """The board as `cv2.findChessboardCornersSB` alone sees it, to its own accuracy; it sees whole boards only.
 
     Which corner is which is what the lattice finder says of the place.
     """
-    seen = find_board(image, target)
+    seen = find_board(image, target, check_time)
     whole = target.inner[0] * target.inner[1]
     if isinstance(seen, PointStatus):
         return seen

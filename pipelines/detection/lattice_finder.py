@@ -27,6 +27,7 @@ from pipelines.detection.saddles import find_saddles, smooth
 from pipelines.detection.sampling import Level
 from pipelines.detection.square_look import look_at_squares
 from pipelines.detection.statuses import PointStatus
+from pipelines.detection.time_limit import Check, unlimited
 from render.targets.chessboard import Chessboard
 
 MOST_PIECES = 3  # of a level's lattices that are looked at, the largest
@@ -64,14 +65,16 @@ class SeenLattice:
         return self.status in TOLD and self.side_px > ENOUGH_PX * 2.0 * scale
 
 
-def find_lattice(image: NDArray[np.uint8], target: AnyChessboard) -> SeenLattice | None:
+def find_lattice(image: NDArray[np.uint8], target: AnyChessboard, check_time: Check = unlimited) -> SeenLattice | None:
     """The board's corners as the level shows them that shows most; None if no level shows a lattice."""
     best: SeenLattice | None = None
     whole = target.inner[0] * target.inner[1]
     for level in levels(image):
         if best is not None and best.is_sharp_at(level.scale):
             continue
+        check_time()
         for seen in _seen(level, target):
+            check_time()
             if seen.is_better_than(best):
                 best = seen
         if best is not None and best.status == PointStatus.OK and best.count == whole:
@@ -111,12 +114,7 @@ def _told(level: LevelOf, smoothed: Level, grid: Grid, target: AnyChessboard) ->
     firm, board = _without_outliers(firm, level, side)
     if board is None or not _is_smooth(firm, board, side):
         return None
-    radius = target.circle_radius_mm / target.square_mm if isinstance(target, Chessboard) else None
-    margin = target.margin_squares if isinstance(target, Chessboard) else target.margin_mm / target.square_mm
-    look = look_at_squares(level.grey, board, firm, radius, margin)
-    rows, columns = firm.points.shape[:2]
-    middle = (np.array([columns, rows]) - 1.0) / 2.0
-    told = identify((columns, rows), firm.white_first, look, target, board.jacobian(middle))
+    told = _placed(level, firm, board, target)
     if isinstance(told, PointStatus):
         enough = count >= LEAST_PART * target.inner[0] * target.inner[1]
         return SeenLattice(told, np.empty(0, np.int64), np.empty((0, 2)), count, level.scale * side) if enough else None
@@ -124,6 +122,18 @@ def _told(level: LevelOf, smoothed: Level, grid: Grid, target: AnyChessboard) ->
     ids = np.flatnonzero(corners.known)
     points = level.in_picture(corners.points.reshape(-1, 2)[ids])
     return SeenLattice(PointStatus.OK, ids, points, len(ids), level.scale * side, told.exchanged)
+
+
+def _placed(level: LevelOf, grid: Grid, board: BoardMap, target: AnyChessboard) -> Placement | PointStatus:
+    """Where on the board the lattice lies. One that is larger is not looked at: its squares may be thousands."""
+    rows, columns = grid.points.shape[:2]
+    if any(own > most for own, most in zip(sorted((columns, rows)), sorted(target.inner), strict=True)):
+        return PointStatus.OTHER_BOARD
+    radius = target.circle_radius_mm / target.square_mm if isinstance(target, Chessboard) else None
+    margin = target.margin_squares if isinstance(target, Chessboard) else target.margin_mm / target.square_mm
+    look = look_at_squares(level.grey, board, grid, radius, margin)
+    middle = (np.array([columns, rows]) - 1.0) / 2.0
+    return identify((columns, rows), grid.white_first, look, target, board.jacobian(middle))
 
 
 def _firm_part(smoothed: Level, grid: Grid) -> Grid:

@@ -8,7 +8,7 @@ import numpy as np
 
 from eposit.arrays import Array, Mask
 from pipelines.detection.board_map import BoardMap, Lift
-from pipelines.detection.circle_grids import find_circle_grid, refine_circles
+from pipelines.detection.circle_grids import find_circle_grid, opencv_centres, refine_circles
 from pipelines.detection.consistency import Corners, check_placed
 from pipelines.detection.corner_sites import CornerSites
 from pipelines.detection.corners import refine_corners
@@ -18,6 +18,7 @@ from pipelines.detection.grey_picture import Grey
 from pipelines.detection.markers import find_aprilgrid, find_charuco
 from pipelines.detection.seen_points import SeenPoints
 from pipelines.detection.statuses import PointStatus
+from pipelines.detection.time_limit import Check, unlimited
 from render.targets.aprilgrid import BORDER_MODULES, AprilGrid, tag_bits
 from render.targets.charuco import Charuco
 from render.targets.circle_grid import CircleGrid
@@ -29,7 +30,7 @@ GENTLE_PX = 0.5  # distance at which a seen point's weight in the first map is o
 BORDER_PX = 3.0  # a point nearer to the picture's border than this is not looked for
 
 
-def find_points(image: Grey, target: PrintedBoard) -> SeenPoints | PointStatus:
+def find_points(image: Grey, target: PrintedBoard, check_time: Check = unlimited) -> SeenPoints | PointStatus:
     """Points of the target as a finder sees them, or the status of all if it sees too few, or not which they are."""
     seen: SeenPoints | PointStatus | None = None
     if isinstance(target, Charuco):
@@ -37,21 +38,22 @@ def find_points(image: Grey, target: PrintedBoard) -> SeenPoints | PointStatus:
     elif isinstance(target, AprilGrid):
         seen = find_aprilgrid(image, target)
     elif isinstance(target, CircleGrid):
-        seen = find_circle_grid(image, target)
+        seen = find_circle_grid(image, target, check_time=check_time)
     elif isinstance(target, PlainChessboard):
-        seen = find_board(image, target)
+        seen = find_board(image, target, check_time=check_time)
     if isinstance(seen, PointStatus):
         return seen
     return seen if seen is not None and len(seen.ids) >= LEAST_SEEN else PointStatus.BOARD_NOT_FOUND
 
 
-def place_points(image: Grey, seen: SeenPoints, target: PrintedBoard) -> Corners:
+def place_points(image: Grey, seen: SeenPoints, target: PrintedBoard, check_time: Check = unlimited) -> Corners:
     """All points of the target, placed by our fits; consistent are those that agree with the others.
 
     Raises:
         LinAlgError: points that no camera could see.
     """
     unit = target.unit_mm
+    check_time()
     at, size = target.pattern_points / unit, (image.shape[1], image.shape[0])
     board = _first_map(seen, at, size, _lift(target, unit))
     if isinstance(target, CircleGrid):
@@ -62,17 +64,18 @@ def place_points(image: Grey, seen: SeenPoints, target: PrintedBoard) -> Corners
     inside = _is_inside(board(at), size)
     read = np.zeros(len(at), bool)
     read[seen.ids] = True
-    corners = refine_corners(image, board, sites.chosen(inside))
+    corners = refine_corners(image, board, sites.chosen(inside), check_time=check_time)
     chosen = inside
     if not np.any(corners.consistent) and np.any(inside & read) and not np.all(read[inside]):
         chosen = inside & read  # most of the others may be covered
-        corners = refine_corners(image, board, sites.chosen(chosen))
+        corners = refine_corners(image, board, sites.chosen(chosen), check_time=check_time)
     return _spread(corners, chosen)
 
 
 def check_seen(image: Grey, seen: SeenPoints, placed: Corners, target: PrintedBoard) -> Corners:
-    """The points as OpenCV places them, those of corners after `cv2.cornerSubPix`; checked as our own are."""
-    points = seen.points_px if isinstance(target, CircleGrid) else subpix(image, seen.points_px)
+    """The points as OpenCV places them, by `cv2.cornerSubPix` or, discs, its blobs; checked as our own are."""
+    place = opencv_centres if isinstance(target, CircleGrid) else subpix
+    points = place(image, seen.points_px)
     at, size = target.pattern_points[seen.ids] / target.unit_mm, (image.shape[1], image.shape[0])
     chosen = np.zeros(len(placed.points_px), bool)
     chosen[seen.ids] = True

@@ -17,6 +17,7 @@ class PointStatus(StrEnum):
     ORIENTATION_AMBIGUOUS = "orientation_ambiguous"  # corners are seen, but not which of the board's they are
     CORNERS_INCONSISTENT = "corners_inconsistent"  # the corner, or too many of the board's, disagree with the others
     CIRCLE_NOT_FOUND = "circle_not_found"  # no dark disc where the board puts the circle
+    TOO_LATE = "too_late"  # the picture's detection has taken longer than it may; no bound on its work ended it
     POINT_NOT_FOUND = "point_not_found"  # of a board that was seen: outside the picture, covered, or unlike it
 
 

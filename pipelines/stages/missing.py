@@ -18,6 +18,7 @@ from datasets.store.atomic import write_text
 from datasets.store.dataset import Dataset
 from datasets.store.quarantine import FAILED, QUARANTINE
 from pipelines.adapters.process import LIMIT_S
+from pipelines.detection.time_limit import DETECT_SECONDS
 from pipelines.engines.engine import Engine, Failure
 from pipelines.stages.part import WHOLE, Part
 
@@ -58,6 +59,7 @@ class Execution:
     part: Part = WHOLE
     lists: bool = True  # whether each stage writes the manifest at its end
     limit_s: float = LIMIT_S  # for a user's function and one image
+    detect_seconds: float = DETECT_SECONDS  # of processor time, for the detection of one picture
     goes_on: bool = False  # whether a shard that fails twice is left out, and noted, instead of ending all
     failures: list[ShardFailure] = field(default_factory=list)  # of the shards that could not be made
 

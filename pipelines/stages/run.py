@@ -36,6 +36,8 @@ def run_detect(
 ) -> None:
     """Detect what is missing, once the compiled functions are ready: then no two workers compile the same.
 
+    Provisional shards are made again, and what was made from them is removed. Pictures that took too long are told.
+
     kernels: the compiled functions, if they have been begun before.
     Raises:
         UserError: an unknown detector, or one that does not find this kind of target.
@@ -47,10 +49,20 @@ def run_detect(
     stage = Stage(
         "detect" if detector == Detector.EDGE_FIT else f"detect {detector}",
         functools.partial(detect.is_done, detector=detector),
-        functools.partial(detect.run_shard, detector=detector),
+        functools.partial(detect.run_shard, detector=detector, seconds=execution.detect_seconds),
         by_frame=True,
     )
-    run_missing(stage, dataset, _indices(dataset, execution), execution)
+    for index in _indices(dataset, execution):
+        if detect.is_provisional(dataset, index, detector):
+            _forget_estimates(dataset, index, detector)
+    late = run_missing(stage, dataset, _indices(dataset, execution), execution)
+    if late:
+        told = f"{late[0]}{f' and those of {len(late) - 1} more shards' if late[1:] else ''}"
+        print(
+            f"{stage.name}: {told} took more than {execution.detect_seconds:g} s of processor time twice and have the "
+            "status too_late; the same command tries them again, --detect-seconds gives them more",
+            file=sys.stderr,
+        )
 
 
 def run_estimate(
@@ -118,6 +130,18 @@ def run_score(dataset: Dataset, execution: Execution) -> None:
         for _ in dataset.each_shard("estimates", ["frame_id"]):
             pass  # which refuses estimates that are not whole
     run_missing(Stage("score", score.is_done, score.run_shard), dataset, shards, execution)
+
+
+def _forget_estimates(dataset: Dataset, index: int, detector: str) -> None:
+    """Remove the estimates, with their scores, that were made from a shard of detections."""
+    source = Setting(detector=detector).points_name
+    for path in dataset.shards("estimates"):
+        if (
+            dataset.index_of(path) == index
+            and source in dataset.read_shard(path, ["point_source"])["point_source"].to_pylist()
+        ):
+            score.forget(dataset, path)
+            dataset.remove_shard(path)
 
 
 def _indices(dataset: Dataset, execution: Execution) -> range:

@@ -13,6 +13,7 @@ from eposit import Camera
 from pipelines.adapters.registry import check_solver, takes_four
 from pipelines.adapters.user import file_name
 from pipelines.detection import Detector, takes_target
+from pipelines.detection.time_limit import MOST_DETECT_SECONDS
 from render.targets.chessboard import Chessboard
 from render.targets.kinds import AnyTarget
 
@@ -41,6 +42,19 @@ def check_target(detector: str, target: AnyTarget) -> None:
     if not takes_target(detector, target):
         others = ", ".join(name for name in Detector if takes_target(name, target))
         raise UserError(f"detector {detector!r} does not find the target {target.pattern!r}; choose one of {others}")
+
+
+def check_detect_seconds(seconds: float) -> None:
+    """Refuse a limit that is not usable.
+
+    Raises:
+        UserError: with those that are.
+    """
+    if not 0.0 < seconds <= MOST_DETECT_SECONDS:
+        raise UserError(
+            f"--detect-seconds {seconds:g}: give seconds of processor time above 0, at most {MOST_DETECT_SECONDS:g}, "
+            "as 2"
+        )
 
 
 @dataclass(frozen=True, slots=True)

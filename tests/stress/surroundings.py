@@ -30,6 +30,17 @@ def checkers(period, deg=20.0):
     return behind
 
 
+def halftone(period, deg=45.0):
+    """A background of a halftone screen, as print has it."""
+    c, s = np.cos(np.radians(deg)), np.sin(np.radians(deg))
+
+    def behind(x, y, cell):
+        u, v = (2.0 * np.pi * q / period for q in (c * x + s * y, c * y - s * x))
+        return np.clip(0.4 + 0.6 * (np.cos(u) + np.cos(v)), 0.08, 0.75)
+
+    return behind
+
+
 def clutter(rng):
     """A background of boxes of every grey: three layers, each with one box in each cell of a lattice of its own."""
     layers = [_boxes(rng, period) for period in (110.0, 60.0, 33.0)]

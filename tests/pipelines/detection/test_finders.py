@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from pipelines.detection import Detector, detect_points
+from pipelines.detection import Detector, detect_points, lattice_finder
 from pipelines.detection.board_map import grid
 from pipelines.detection.finders import find_board, find_sector_based
 from pipelines.detection.statuses import PointStatus
@@ -142,6 +142,20 @@ def test_what_is_not_the_board_gives_a_status(kind, detector):
     assert set(found.status) == {WRONG[kind]}
     assert np.isnan(found.points_px).all()
     assert np.isnan(found.covariance_px2).all()
+
+
+def test_the_squares_of_a_lattice_larger_than_the_board_are_not_looked_at(monkeypatch):
+    """Those of a texture are thousands, and each is compared with each: 8 s and 2.3 GB over 24 megapixels."""
+
+    def look(*_):
+        raise AssertionError("looked at")
+
+    monkeypatch.setattr(lattice_finder, "look_at_squares", look)
+    y, x = np.mgrid[0:400, 0:500] // 20
+    checkers = cv2.GaussianBlur(np.where((x + y) % 2, 40, 200).astype(np.uint8), (0, 0), 0.8)
+    assert find_board(checkers, TARGET) == PointStatus.OTHER_BOARD
+    with pytest.raises(AssertionError):
+        find_board(drawn(30.0, 10.0)[0], TARGET)
 
 
 def test_a_large_picture_of_noise_comes_to_an_end():

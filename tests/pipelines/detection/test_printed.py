@@ -7,7 +7,7 @@ from eposit import Camera, Pose
 from eposit.pose import rotation_from_euler
 from pipelines.detection import Detector, detect_points, takes_target
 from pipelines.detection.circle_grids import find_circle_grid
-from pipelines.detection.printed import corner_sites, find_points
+from pipelines.detection.printed import corner_sites
 from pipelines.stages.generate import outline_centroid
 from render.frame import render_frame
 from render.light import Light
@@ -93,6 +93,21 @@ def test_a_symmetric_grid_is_read_as_standing_upright():
     assert np.abs(seen.points_px - truth[::-1]).max() < 1.0
 
 
+def test_discs_of_a_texture_and_black_squares_are_no_grid():
+    """Every other disc of a texture lies as those of an asymmetric grid do, and so do a chessboard's black squares."""
+    target = CircleGrid()
+    discs = target.pattern_points / target.spacing_mm * 24.0 + 60.0
+    y, x = np.mgrid[0:360, 0:280]
+    apart = np.hypot((x - 12) % 24 - 12, (y - 12) % 24 - 12)
+    texture = np.where(apart < 7.0, 30, 200).astype(np.uint8)
+    assert set(detect_points(texture, target).status) == {"board_not_found"}
+    squares = np.full((360, 280), 200, np.uint8)
+    for column, row in np.rint(discs).astype(int):
+        squares[row - 12 : row + 12, column - 12 : column + 12] = 30
+    assert find_circle_grid(squares, target) is not None
+    assert set(detect_points(squares, target).status) == {"corners_inconsistent"}
+
+
 def test_opencv_sees_the_centroid_of_a_disc_and_we_place_its_centre():
     target = CircleGrid(columns=3, rows=5, spacing_mm=120.0, diameter_mm=100.0)
     where = pose(target)
@@ -102,7 +117,7 @@ def test_opencv_sees_the_centroid_of_a_disc_and_we_place_its_centre():
     apart = np.linalg.norm(outline - centre, axis=1)
     assert apart.max() > 0.3
     assert np.abs(detect_points(image, target).points_px - centre).max() < 0.02
-    theirs = find_points(image, target).points_px
+    theirs = detect_points(image, target, Detector.OPENCV_SUBPIX).points_px
     assert np.abs((theirs - outline).mean(axis=0)).max() < 0.05  # thresholds of whole pixels
     assert np.linalg.norm(theirs - outline, axis=1).mean() < 0.3 * np.linalg.norm(theirs - centre, axis=1).mean()
 

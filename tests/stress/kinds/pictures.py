@@ -33,4 +33,8 @@ KINDS = (
          scene=around.behind(around.checkers(40.0))),
     Kind("no-board-24-megapixels", "a cluttered wall, 24 megapixels", board=None, nothing=True,
          framing=Framing(width=6000, height=4000), scene=around.cluttered, finer=2, views=5),
+    Kind("no-board-24-megapixels-checkers", "checkers of 80 px all over 24 megapixels", board=None, nothing=True,
+         framing=Framing(width=6000, height=4000), scene=around.behind(around.checkers(80.0)), finer=1, views=3),
+    Kind("no-board-24-megapixels-halftone", "a halftone screen of 40 px, 24 megapixels", board=None, nothing=True,
+         framing=Framing(width=6000, height=4000), scene=around.behind(around.halftone(40.0)), finer=1, views=3),
 )  # fmt: skip
