@@ -15,6 +15,11 @@ from eposit.solution import Solution, Status, in_order, join, without_pose
 LEAST_POINTS = 8  # two may be exchanged: of the six others three give a pose, and three confirm it
 CONTRADICTION = 5.0  # standard deviations of a chi-square's cube root from which a fit contradicts its sigma: 3e-7
 
+# -2 log of the likelihood of a wrong point that lies at a right one's place, beside a right one's: it may lie anywhere
+# in some 400 x 400 standard deviations. Poses whose likelihoods differ by less are rivals.
+WRONG = 20.0
+TINY = 1e-12  # px^2: a sum of squares below it is rounding
+
 SolvePart = Callable[[Mask, Array], Solution]  # (n,) points in use, (b, m, 2) their image points
 
 
@@ -30,7 +35,7 @@ def solve_robust(
         ValueError: fewer than eight points.
     """
     from eposit.compiled.machine_code import native
-    from eposit.compiled.robust import find_inliers
+    from eposit.compiled.robust import FEW, KEPT, find_inliers
 
     n = len(obj)
     if n < LEAST_POINTS:
@@ -38,12 +43,13 @@ def solve_robust(
             f"robust=True was given {n} points; it takes {LEAST_POINTS} or more, so that with two exchanged three of "
             "the others give a pose and three confirm it: give more points or leave robust out"
         )
-    w, there = workspace(camera, n), np.empty(pixels.shape[:2])
+    kept = KEPT if n <= FEW else 1
+    w, there, sums = workspace(camera, n), np.zeros((len(pixels), kept, n)), np.empty((len(pixels), kept, 2))
     native(find_inliers)(
         w.ctypes.data, n, obj.ctypes.data, pixels.ctypes.data, weights.ctypes.data, len(weights), len(pixels),
-        variance, there.ctypes.data,
+        variance, kept, there.ctypes.data, sums.ctypes.data,
     )  # fmt: skip
-    inliers = there == 1.0
+    inliers, rivalled = _likeliest(there == 1.0, sums, variance)
     kinds, which = np.unique(inliers, axis=0, return_inverse=True)
     rows = [np.flatnonzero(which.reshape(-1) == i) for i in range(len(kinds))]
     parts = [
@@ -53,7 +59,33 @@ def solve_robust(
         return solve_part(np.ones(n, np.bool_), pixels)
     parts = [replace(part, inliers=inliers[row]) for part, row in zip(parts, rows, strict=True)]
     solution = in_order(join(parts), np.concatenate(rows))
+    solution = replace(solution, ambiguous=solution.ambiguous | (rivalled & (np.asarray(solution.status) == Status.OK)))
     return without_pose(solution, _contradicts(solution), Status.INCONSISTENT) if variance > 0.0 else solution
+
+
+def _likeliest(chosen: Mask, sums: Array, variance: float) -> tuple[Mask, Mask]:
+    """(b, n) inliers of the likeliest of k poses, and (b,) whether another one with other points is nearly as likely.
+
+    Of ten points, half of them wrong, five of which some are wrong often agree on a pose as well as the right five.
+    chosen: (b, k, n) inliers of each pose. sums: (b, k, 2) as `find_inliers` gives them; infinite where there is none.
+    Where sigma is unknown, the pose of the least trimmed squares is taken, and the scatter about each pose, if its
+    points are not fewer, is compared in their place.
+    """
+    count, rows = chosen.sum(axis=2), np.arange(len(chosen))
+    missing = ~np.isfinite(sums[..., 1])
+    if variance > 0.0:
+        price = sums[..., 1] / variance + WRONG * (chosen.shape[2] - count)
+        best = np.argmin(price, axis=1)
+    else:
+        freedom = np.maximum(2.0 * count - 6.0, 1.0)
+        best = np.argmin(sums[..., 0], axis=1)
+        scatter = np.log(np.maximum(sums[..., 1], TINY) / freedom)
+        fewer = count < count[rows, best][:, None]
+        price = np.where(fewer, np.inf, freedom * (scatter - scatter[rows, best][:, None]))
+    price = np.where(missing, np.inf, price)
+    inliers = chosen[rows, best]
+    other = np.any(chosen & ~inliers[:, None], axis=2)
+    return inliers, np.any(other & (price < price[rows, best][:, None] + WRONG), axis=1)
 
 
 def _contradicts(solution: Solution) -> Mask:

@@ -42,7 +42,8 @@ from eposit.compiled.trimming import choose, distances, fit, residuals, smallest
 MOST_TRIANGLES = 220  # all of up to 12 points; of many points, half of them wrong, 26 are right on average
 THIN = 0.05  # of the widest triangle's area: narrower ones tell a pose badly
 KEPT = 6  # poses of triangles that are followed
-KEPT_POSES, KEPT_SUMS = STARTS + 48, SCRATCH + 60
+FEW = 20  # points up to which poses that are kept differ in the points nearest to them: few agree on a pose by chance
+KEPT_POSES, KEPT_SUMS, KEPT_SETS = STARTS + 48, SCRATCH + 60, SCRATCH + 66
 ROUNDS = 3  # of choosing the nearest points and fitting them
 FALSE_ALARM = 0.01  # share of images without a wrong point that may lose one
 MANY, SHARE = 256, 32  # chosen points from which a thirty-second of them is added at once
@@ -59,6 +60,16 @@ def area(w):
     return (ay * bz - az * by) ** 2 + (az * bx - ax * bz) ** 2 + (ax * by - ay * bx) ** 2
 
 
+@compiled(NUMBER, W, WHOLE, WHOLE)
+def nearest_points(w, n, count):
+    """The `count` points that `smallest` has found, as the bits of a whole number."""
+    largest, bit, found = w[POINTS + SORTED * n + count - 1], 1.0, 0.0
+    for i in range(n):
+        found += bit if w[POINTS + RESIDUALS * n + i] <= largest else 0.0
+        bit *= 2.0
+    return found
+
+
 @compiled(NOTHING, W, WHOLE, WHOLE)
 def try_triangle(w, n, least):
     """Keep the poses of the triangle at CORNERS that are among the KEPT of lowest trimmed squares."""
@@ -66,11 +77,16 @@ def try_triangle(w, n, least):
         pose = STARTS + 12 * root
         residuals(w, n, pose)
         total, place_ = smallest(w, n, least), KEPT - 1
+        nearest = nearest_points(w, n, least) if n <= FEW else -1.0
+        for k in range(KEPT):
+            if nearest >= 0.0 and w[KEPT_SETS + k] == nearest:
+                place_ = k
         if total < w[KEPT_SUMS + place_]:
-            w[KEPT_SUMS + place_] = total
+            w[KEPT_SUMS + place_], w[KEPT_SETS + place_] = total, nearest
             copy(w, pose, KEPT_POSES + 12 * place_, 12)
             while place_ > 0 and w[KEPT_SUMS + place_] < w[KEPT_SUMS + place_ - 1]:
                 exchange(w, KEPT_SUMS + place_, KEPT_SUMS + place_ - 1, 1)
+                exchange(w, KEPT_SETS + place_, KEPT_SETS + place_ - 1, 1)
                 exchange(w, KEPT_POSES + 12 * place_, KEPT_POSES + 12 * (place_ - 1), 12)
                 place_ -= 1
 
@@ -79,7 +95,7 @@ def try_triangle(w, n, least):
 def try_triangles(w, n, least):
     """Try all triangles, or so many drawn by a linear congruential generator; thin ones are left out."""
     for k in range(KEPT):
-        w[KEPT_SUMS + k] = math.inf
+        w[KEPT_SUMS + k], w[KEPT_SETS + k] = math.inf, -1.0
     thin = THIN * THIN * area(w)
     if n * (n - 1) * (n - 2) // 6 <= MOST_TRIANGLES:
         for i in range(n):
@@ -101,6 +117,17 @@ def try_triangles(w, n, least):
                 break
 
 
+@compiled(NUMBER, W, WHOLE, WHOLE, WHOLE)
+def concentrate(w, n, least, pose):
+    """Fit a pose to the points nearest to it, again and again; its trimmed squares."""
+    for _ in range(ROUNDS):
+        residuals(w, n, pose)
+        choose(w, n, least)
+        fit(w, n, pose)
+    residuals(w, n, pose)
+    return smallest(w, n, least)
+
+
 @compiled(WHOLE, W, WHOLE, WHOLE)
 def trimmed(w, n, least):
     """At MINIMA a pose of least trimmed squares, with its points chosen; 0 if there is none."""
@@ -109,12 +136,7 @@ def trimmed(w, n, least):
         pose = KEPT_POSES + 12 * k
         if not w[KEPT_SUMS + k] < math.inf:
             break
-        for _ in range(ROUNDS):
-            residuals(w, n, pose)
-            choose(w, n, least)
-            fit(w, n, pose)
-        residuals(w, n, pose)
-        total = smallest(w, n, least)
+        total = concentrate(w, n, least, pose)
         if total < best:
             best = total
             copy(w, pose, MINIMA, 12)
@@ -182,12 +204,30 @@ def observe_any(w, n, pixels, row, weights, m):
     return there
 
 
-@compiled(NOTHING, W, WHOLE, POINTER, POINTER, POINTER, WHOLE, WHOLE, NUMBER, POINTER)
-def find_inliers(w, n, points, pixels, weights, m, b, variance, inliers):
-    """Into inliers (b, n) 1 for points that agree on one pose: three in four or more of 8 or 9, half of more.
+@compiled(NOTHING, W, WHOLE, WHOLE, WHOLE, POINTER, POINTER, WHOLE)
+def tell(w, n, row, found, inliers, sums, place_):
+    """Into the row of inliers (., n) the chosen points, all where none are found; into sums (., 2) the squares."""
+    first, total = n * row, 0.0
+    if found == 1:
+        fit(w, n, MINIMA)
+        residuals(w, n, MINIMA)
+    for i in range(n):
+        chosen = found == 0 or w[POINTS + INFO * n + 3 * i] > 0.0
+        inliers[first + i] = 1.0 if chosen else 0.0
+        if found == 1 and chosen:
+            total += w[POINTS + RESIDUALS * n + i]
+    sums[2 * row] = w[KEPT_SUMS + place_] if found == 1 else 0.0
+    sums[2 * row + 1] = total
+
+
+@compiled(NOTHING, W, WHOLE, POINTER, POINTER, POINTER, WHOLE, WHOLE, NUMBER, WHOLE, POINTER, POINTER)
+def find_inliers(w, n, points, pixels, weights, m, b, variance, kept, inliers, sums):
+    """Into inliers (b, kept, n) 1 for points that agree on one pose: three in four or more of 8 or 9, half of more.
 
     weights (m, 3): inverse covariances in px^-2, m = n or 1; variance: what they are to be divided by, px^2, 0 where it
     is unknown. A point that is NaN or that no ray reaches counts as wrong. All 1 where too few are there.
+    kept: 1, or KEPT for n up to FEW; each of KEPT poses then has a row, NaN where there are not so many.
+    sums (b, kept, 2): the squares of the least number of points, then those of the inliers, for these weights.
     """
     place(w, n, points)
     whole = describe(w, n)
@@ -200,7 +240,20 @@ def find_inliers(w, n, points, pixels, weights, m, b, variance, inliers):
             w[CORNERS], w[CORNERS + 1], w[CORNERS + 2] = first, second, third
             try_triangles(w, n, least)
             found = trimmed(w, n, least)
-        if found == 1:
-            search_forward(w, n, least, there, variance)
-        for i in range(n):
-            inliers[n * row + i] = 1.0 if found == 0 or w[POINTS + INFO * n + 3 * i] > 0.0 else 0.0
+        if kept == 1:
+            if found == 1:
+                search_forward(w, n, least, there, variance)
+            tell(w, n, row, found, inliers, sums, 0)
+            continue
+        for k in range(kept):
+            pose = KEPT_POSES + 12 * k
+            if found == 1 and w[KEPT_SUMS + k] < math.inf:
+                copy(w, pose, MINIMA, 12)
+                w[KEPT_SUMS + k] = concentrate(w, n, least, MINIMA)
+                choose(w, n, least)
+                search_forward(w, n, least, there, variance)
+                tell(w, n, kept * row + k, 1, inliers, sums, k)
+            elif k == 0:
+                tell(w, n, kept * row, 0, inliers, sums, 0)
+            else:
+                sums[2 * (kept * row + k)], sums[2 * (kept * row + k) + 1] = math.inf, math.inf

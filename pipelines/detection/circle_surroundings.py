@@ -8,7 +8,8 @@ from eposit.arrays import Array
 from pipelines.detection.board_map import BoardMap
 from render.targets.chessboard import Chessboard
 
-MARGIN_PX, MARGIN_BLURS = 2.5, 2.5  # kept clear around the circle and its shade: px, or blurs if they are more
+MARGIN_PX, MARGIN_BLURS = 2.5, 2.5  # kept clear around the circle: px, or blurs if they are more,
+SHADOW_SQUARES = 0.1  # or its height, up to this: as far reaches the shadow of a lamp 45 degrees off the board's normal
 FARTHEST_PARALLAX = 3.0  # heights of the circle: a larger one is an ambiguous map's invention
 SMALL_PARALLAX = 0.3  # squares: up to here the circle may be displaced either way, which a small tilt leaves open
 
@@ -24,8 +25,6 @@ def ellipses_around_circle(board: BoardMap, target: Chessboard, blur_px: float) 
     parallax = board(foot, height) - base
     squares = float(np.linalg.norm(inverse @ parallax))
     ways = [0.0] if squares > FARTHEST_PARALLAX * height else [0.0, 1.0, -1.0][: 3 if squares <= SMALL_PARALLAX else 2]
-    radius = (
-        target.circle_radius_mm / target.square_mm
-        + max(MARGIN_PX, MARGIN_BLURS * blur_px) * np.linalg.norm(inverse, axis=1).max()
-    )
+    margin = max(MARGIN_PX, MARGIN_BLURS * blur_px) * np.linalg.norm(inverse, axis=1).max()
+    radius = target.circle_radius_mm / target.square_mm + max(margin, min(height, SHADOW_SQUARES))
     return base + np.array(ways)[:, None] * parallax, inverse / radius

@@ -9,6 +9,7 @@ import numpy as np
 
 from eposit.arrays import Array, Mask
 from pipelines.detection.board_map import BoardMap, normal_angles
+from pipelines.detection.circle_shade import without_shade
 from pipelines.detection.circle_surroundings import ellipses_around_circle
 from pipelines.detection.consistency import Corners, drop_inconsistent
 from pipelines.detection.corner_blur import measured_blur, widths_beyond
@@ -77,6 +78,8 @@ def refine_corners(
         if not exponent:
             exponent = measured_exponent(image, board, sites)
             light = decoded(image, exponent)
+            if sites.circled is not None:
+                light = without_shade(light, board, sites.circled, corners.blur_px)
         limits = FINAL._replace(reach=_form_reach(corners, board, at))
         corners, shapes = _fit(light, board, sites, _next_shapes(corners, shapes, board, at), limits)
     corners = replace(corners, exponent=exponent)

@@ -17,8 +17,7 @@ from tests.cameras import ALL_CAMERAS, PAPER_OBJECT, PAPER_PINHOLE, helix_pose, 
 
 # The simulation's principal point to all its decimals.
 PINHOLE = paper_camera("perspective").replace(**PAPER_PINHOLE | {"cx": 807.41661, "cy": 602.4737})
-# A problem counts as degenerate where the information matrix of its pose, scaled to a unit diagonal, has a condition
-# above this: its square root is the loss of digits, and twelve are promised.
+# Condition of the information, scaled to a unit diagonal, above which a problem is degenerate: its root loses digits.
 DEGENERATE = 1e6
 
 
