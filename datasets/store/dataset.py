@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from datasets.errors import UserError
 from datasets.recipe.model import Recipe, load_recipe
@@ -40,6 +39,7 @@ from datasets.store.shard_file import (
     DamagedShardError,
     UnknownVersionError,
     place_of,
+    read_footer,
     read_rows,
     version_of,
     write_rows,
@@ -81,7 +81,7 @@ class Dataset:
         if not path.is_file():
             return False
         try:
-            footer = pq.read_metadata(path).metadata or {}
+            footer = read_footer(path).metadata or {}
         except PermissionError:
             raise unreadable(path) from None
         except UNREADABLE:
@@ -106,7 +106,7 @@ class Dataset:
         try:
             with replace_atomically(path) as temporary:
                 write_rows(temporary, path.parent.name, table, footer)
-                pq.read_metadata(temporary)
+                read_footer(temporary)
         except OSError as error:
             raise refused(path, error) from error
 
@@ -218,4 +218,4 @@ def open_dataset(root: Path, provenance: Provenance | None = None, *, check: boo
     path = root / RECIPE_FILE
     if not path.is_file():
         raise UserError(f"{root} holds no dataset ({RECIPE_FILE} is missing); run `generate RECIPE --out {root}` first")
-    return Dataset(root, as_begun(load_recipe(str(path))[0], root), provenance, check)
+    return Dataset(root, as_begun(load_recipe(path)[0], root), provenance, check)
