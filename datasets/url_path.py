@@ -18,7 +18,7 @@ import functools
 import io
 import os
 import stat
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from pathlib import Path, PosixPath
 from typing import TYPE_CHECKING, Any, TypeVar
 from urllib.parse import quote, unquote, urlsplit
@@ -78,14 +78,14 @@ class UrlPath(PosixPath):
         """Whether the names of some files begin with this one and a slash."""
         return self._is(stat.S_ISDIR)
 
-    def iterdir(self) -> Iterator[UrlPath]:
+    def iterdir(self) -> Generator[UrlPath, None, None]:
         """What is in this folder; nothing if there is none."""
         for info in self._listed(recursive=False):
             yield self / info.path.rpartition("/")[2]
 
-    def glob(self, pattern: str, **_: Any) -> Iterator[UrlPath]:
+    def glob(self, pattern: str, **_: Any) -> Generator[UrlPath, None, None]:
         """What in this folder has a name of the pattern, which is for one folder only."""
-        return (path for path in self.iterdir() if fnmatch.fnmatchcase(path.name, pattern))
+        yield from (path for path in self.iterdir() if fnmatch.fnmatchcase(path.name, pattern))
 
     def sizes(self) -> dict[str, int]:
         """Bytes of every file below, by its path from here."""
@@ -140,9 +140,11 @@ class UrlPath(PosixPath):
             if not missing_ok:
                 raise
 
-    def rename(self, target: Path) -> Path:
+    def rename(self, target: str | os.PathLike[str]) -> UrlPath:
         """Move the file to another path of its store."""
-        to = target._place if isinstance(target, UrlPath) else str(target)
+        if not isinstance(target, UrlPath):
+            raise TypeError(f"{self} cannot be moved to {target}, which is in no store")
+        to = target._place
         if self._files.type_name == "local":
             self._ask(lambda files: files.create_dir(to.rpartition("/")[0], recursive=True))
         self._ask(lambda files: files.move(self._place, to))

@@ -183,6 +183,15 @@ class Dataset:
         Raises:
             UserError: there are none, one is missing beside others, or one is damaged.
         """
+        for path in self.whole(table):
+            yield self.read_shard(path, columns)
+
+    def whole(self, table: str) -> list[Path]:
+        """The shards of a table, in order, each kind with all that it must have.
+
+        Raises:
+            UserError: there are none, or one is missing beside others.
+        """
         paths = self.shards(table)
         if not paths:
             raise UserError(f"{self.root} has no {table} yet; run the {stage_of(self.root / table / 'x')} stage first")
@@ -192,8 +201,7 @@ class Dataset:
             for path in (self.shard_path(table, index, int(count), variant) for index in range(int(count))):
                 if path not in there:
                     raise missing(path)
-        for path in paths:
-            yield self.read_shard(path, columns)
+        return paths
 
     def write_manifest(self) -> None:
         """Manifest and dataset card, both derived from the shards and rebuilt at every stage's end.
