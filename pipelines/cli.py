@@ -14,6 +14,7 @@ import typer.core
 import typer.main
 
 from datasets.errors import UserError
+from datasets.url_path import UnreachableError
 from pipelines.commands import compare, nightly, plan, stages, tools, transfer
 from pipelines.endings import UNFINISHED, USER_ERROR, UnfinishedError, printable, say_unexpected
 
@@ -117,7 +118,7 @@ def _told(error: Exception) -> str | None:
     from datasets.store.refusals import refused
     from render.backend import BackendError
 
-    if isinstance(error, UserError | BackendError):
+    if isinstance(error, UserError | UnreachableError | BackendError):
         return str(error)
     if isinstance(error, PermissionError):
         return f"cannot use {error.filename}: this user has no permission; ask its owner"

@@ -16,7 +16,7 @@ RESAMPLES = 1000
 FEW = 200  # resamples where a table has many scores: an interval's ends are good to a tenth of its length
 LEVEL = 0.95
 LEAST_FOR_TAIL = 72  # units: 0.95^72 is below 2.5 %, the chance that all lie below their 95th percentile
-CHUNK_VALUES = 4_000_000  # resampled values held at once
+CHUNK_VALUES = 500_000  # resampled values held at once
 
 
 @dataclass(frozen=True, slots=True)

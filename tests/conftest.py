@@ -13,6 +13,7 @@ from datasets.verify import verify
 from pipelines.cli import main
 
 pytest.register_assert_rewrite("tests.wrong_input")
+from tests.object_store import server as server  # noqa: E402
 from tests.wrong_input import Place  # noqa: E402
 
 # Two frames of 400 x 300 px, a shard each; the board fills the middle of the picture.

@@ -15,7 +15,8 @@ from datasets.store.dataset import open_dataset
 from eposit.arrays import Array
 from pipelines.detection import Detector
 from pipelines.report.data import normalised_rows, series
-from pipelines.report.points import LEAST_SIDE_PX, PointErrors, field_rows, point_errors, tilt_rows
+from pipelines.report.point_tables import LEAST_SIDE_PX, field_rows, tallied, tilt_rows
+from pipelines.report.points import PointErrors, point_errors
 
 FRAME_COLUMNS = ("frame_id", "camera_name", "tilt_deg", "cx_px", "cy_px")
 MEANS = ("mean_x", "mean_y", "mean_radial", "mean_along_x")
@@ -47,7 +48,7 @@ class Results:
             UserError: as `points`.
         """
         errors, frames = self.points(name, detector)
-        return tilt_rows([errors], frames)
+        return tilt_rows([tallied(errors, frames)], frames)
 
     def large_square_rows(self, name: str, to_deg: float) -> list[dict[str, Any]]:
         """A row of `field_rows` for each camera and angle off the axis up to `to_deg`; large local squares only.
@@ -56,7 +57,7 @@ class Results:
             UserError: as `points`.
         """
         errors, frames = self.points(name)
-        rows = field_rows([errors], frames)
+        rows = field_rows([tallied(errors, frames)], frames)
         return [row for row in rows if row["side"] == f"from {LEAST_SIDE_PX:g}" and float(row["angle"]) <= to_deg]
 
     def pose_errors(self, name: str) -> list[float]:
@@ -65,7 +66,7 @@ class Results:
         Raises:
             UserError: as `points`.
         """
-        rows = normalised_rows(series(open_dataset(self.folder / name).read("scores")))
+        rows = normalised_rows(series(open_dataset(self.folder / name).each_shard("scores")))
         (found,) = (row["rms"] for row in rows if row["setting"] == OUR_SETTING)
         return found
 

@@ -233,7 +233,7 @@ def target_of(pattern: str, values: Sequence[str]) -> AnyTarget:
     return parse_recipe(text, "target").target
 
 
-def load_recipe(name: str) -> tuple[Recipe, str]:
+def load_recipe(given: str | Path) -> tuple[Recipe, str]:
     """A recipe and its text, by path or by the name of one that comes with the package.
 
     The text has values instead of the names of camera sets, so that a dataset which keeps it needs nothing else.
@@ -241,13 +241,15 @@ def load_recipe(name: str) -> tuple[Recipe, str]:
     Raises:
         UserError: no such file or name, or a wrong recipe.
     """
-    if name.endswith(SUFFIX) or "/" in name:
+    name = str(given)
+    if isinstance(given, Path) or name.endswith(SUFFIX) or "/" in name:
+        path = given if isinstance(given, Path) else Path(given)
         try:
-            text = read_small_text(Path(name))
+            text = read_small_text(path)
         except (OSError, UnicodeDecodeError) as error:
             reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
             raise UserError(f"cannot read recipe {name}: {reason}; give a .toml file, or one of {_known()}") from None
-        text = with_world_file(text, Path(name).parent, name)
+        text = with_world_file(text, path.parent, name)
         return parse_recipe(text, name), written_out(text, name)
     if name not in recipe_names():
         hint = did_you_mean(name, recipe_names())

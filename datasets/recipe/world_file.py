@@ -34,7 +34,7 @@ def with_world_file(text: str, folder: Path, source: str) -> str:
     path = (folder / world["file"]).absolute()
     try:
         values = {"file": str(path), "file_sha256": world.get("file_sha256") or file_digest(path)}
-    except ValueError as error:
+    except (ValueError, TypeError) as error:  # TypeError: in an object store, where no scene is read
         raise UserError(f"{source}: {error}") from None
     if all(world.get(key) == value for key, value in values.items()):
         return text

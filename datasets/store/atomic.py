@@ -12,12 +12,15 @@ import os
 import platform
 import re
 import secrets
+import shutil
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import Enum
 from pathlib import Path
 
 from datasets.store.refusals import refused
+from datasets.url_path import UrlPath
 
 try:
     import fcntl
@@ -25,6 +28,7 @@ except ImportError:  # a system without flock: files of others are then never ta
     fcntl = None
 
 TEMPORARY_PREFIX = ".tmp-"
+SCRATCH_PREFIX = ".eposit-"  # of files among the machine's temporary ones, on their way to or from an object store
 OWN_NAME = re.compile(r"\.[a-z]+-(?P<host>.+)-\d+-[0-9a-f]{16}")
 NAME_LIMIT = 64  # letters of a host's name, and of a target's name, in a temporary one: 255 bytes is a name's limit
 TRIES = 100
@@ -95,8 +99,13 @@ def _try_lock(descriptor: int, *, alone: bool) -> State:
 
 
 def sweep(root: Path) -> None:
-    """Remove the temporary files under a folder whose process of this host has ended; those of others stay."""
-    for path in root.rglob(f"{TEMPORARY_PREFIX}*"):
+    """Remove the temporary files under a folder whose process of this host has ended; those of others stay.
+
+    Those of an object store lie among the machine's own.
+    """
+    is_url = isinstance(root, UrlPath)
+    found = Path(tempfile.gettempdir()).glob(f"{SCRATCH_PREFIX}*") if is_url else root.rglob(f"{TEMPORARY_PREFIX}*")
+    for path in found:
         if path.is_file() and state_of(path) is State.GONE:
             path.unlink(missing_ok=True)
 
@@ -105,8 +114,14 @@ def sweep(root: Path) -> None:
 def replace_atomically(path: Path) -> Iterator[Path]:
     """A temporary path to write to; on success it takes the place of `path`, on failure nothing changes.
 
-    The file is there already and is to be written in place: a new file of that name would not be held.
+    The file is there already and is to be written in place: a new file of that name would not be held. That of an
+    object store lies on this machine and is put as a whole.
     """
+    if isinstance(path, UrlPath):
+        with _scratch_file(path.name) as temporary:
+            yield temporary
+            path.put(temporary)
+        return
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary, descriptor = create_owned(path.parent, TEMPORARY_PREFIX, f"-{path.name[-NAME_LIMIT:]}")
     try:
@@ -116,6 +131,46 @@ def replace_atomically(path: Path) -> Iterator[Path]:
     finally:
         os.close(descriptor)
         temporary.unlink(missing_ok=True)
+
+
+def copy_file(source: Path, path: Path) -> None:
+    """Write a file with the content of another, as a whole; each may lie in an object store.
+
+    Raises:
+        OSError: the system refuses.
+    """
+    with local_copy(source) as here:
+        if isinstance(path, UrlPath):
+            path.put(here)
+            return
+        with replace_atomically(path) as temporary:
+            shutil.copyfile(here, temporary)
+
+
+@contextmanager
+def local_copy(path: Path) -> Iterator[Path]:
+    """A file of this machine with the content of one that may lie in an object store, for libraries that need it.
+
+    Raises:
+        OSError: it cannot be read, or the disk for temporary files refuses.
+    """
+    if not isinstance(path, UrlPath):
+        yield path
+        return
+    with _scratch_file(path.name) as temporary:
+        temporary.write_bytes(path.read_bytes())
+        yield temporary
+
+
+@contextmanager
+def _scratch_file(name: str) -> Iterator[Path]:
+    """A new file of this machine, removed at the end; the next `sweep` removes that of a process that was killed."""
+    path, descriptor = create_owned(Path(tempfile.gettempdir()), SCRATCH_PREFIX, f"-{name[-NAME_LIMIT:]}")
+    try:
+        yield path
+    finally:
+        os.close(descriptor)
+        path.unlink(missing_ok=True)
 
 
 def write_text(path: Path, text: str) -> None:
@@ -134,9 +189,16 @@ def write_text(path: Path, text: str) -> None:
 def create_text(path: Path, text: str) -> bool:
     """Write a file unless one is there; of several who try at once one does. Whether this call did.
 
+    In an object store several who try at once may all do, and the last one's text stays.
+
     Raises:
         UserError: the disk refuses.
     """
+    if isinstance(path, UrlPath):
+        if path.is_file():
+            return False
+        write_text(path, text)
+        return True
     try:
         temporary, descriptor = create_owned(path.parent, TEMPORARY_PREFIX)
         try:

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from datasets.errors import UserError
 from datasets.recipe.model import Recipe, load_recipe
@@ -41,6 +40,7 @@ from datasets.store.shard_file import (
     DamagedShardError,
     UnknownVersionError,
     place_of,
+    read_footer,
     read_rows,
     version_of,
     write_rows,
@@ -91,7 +91,7 @@ class Dataset:
         if not path.is_file():
             return {}
         try:
-            footer = pq.read_metadata(path).metadata or {}
+            footer = read_footer(path).metadata or {}
         except PermissionError:
             raise unreadable(path) from None
         except UNREADABLE:
@@ -118,7 +118,7 @@ class Dataset:
         try:
             with replace_atomically(path) as temporary:
                 write_rows(temporary, path.parent.name, table, footer)
-                pq.read_metadata(temporary)
+                read_footer(temporary)
         except OSError as error:
             raise refused(path, error) from error
 
@@ -195,6 +195,15 @@ class Dataset:
         Raises:
             UserError: there are none, one is missing beside others, or one is damaged.
         """
+        for path in self.whole(table):
+            yield self.read_shard(path, columns)
+
+    def whole(self, table: str) -> list[Path]:
+        """The shards of a table, in order, each kind with all that it must have.
+
+        Raises:
+            UserError: there are none, or one is missing beside others.
+        """
         paths = self.shards(table)
         if not paths:
             raise UserError(f"{self.root} has no {table} yet; run the {stage_of(self.root / table / 'x')} stage first")
@@ -204,8 +213,7 @@ class Dataset:
             for path in (self.shard_path(table, index, int(count), variant) for index in range(int(count))):
                 if path not in there:
                     raise missing(path)
-        for path in paths:
-            yield self.read_shard(path, columns)
+        return paths
 
     def write_manifest(self) -> None:
         """Manifest and dataset card, both derived from the shards and rebuilt at every stage's end.
@@ -230,4 +238,4 @@ def open_dataset(root: Path, provenance: Provenance | None = None, *, check: boo
     path = root / RECIPE_FILE
     if not path.is_file():
         raise UserError(f"{root} holds no dataset ({RECIPE_FILE} is missing); run `generate RECIPE --out {root}` first")
-    return Dataset(root, as_begun(load_recipe(str(path))[0], root), provenance, check)
+    return Dataset(root, as_begun(load_recipe(path)[0], root), provenance, check)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datasets.recipe.cameras import MAX_PIXELS
-from datasets.store.atomic import replace_atomically
+from datasets.store.atomic import local_copy, replace_atomically
 from datasets.store.silence import silent_library
 
 DIGEST = "digest"  # in the header; files of earlier versions have none
@@ -62,14 +62,14 @@ def read_header(path: Path) -> Header:
     import OpenEXR
 
     try:
-        with silent_library(), OpenEXR.File(str(path), header_only=True) as file:
+        with local_copy(path) as here, silent_library(), OpenEXR.File(str(here), header_only=True) as file:
             parts = len(file.parts)
-            header = dict(file.header())
+            header, size = dict(file.header()), here.stat().st_size
     except (RuntimeError, ValueError, KeyError, IndexError, MemoryError) as error:
         raise DamagedExrError("it cannot be read") from error
     if parts != 1 or header.get("type") != OpenEXR.scanlineimage:
         raise DamagedExrError("it is not one picture of scan lines")
-    _check_size(path, header)
+    _check_size(size, header)
     return header
 
 
@@ -82,12 +82,13 @@ def read_exr(path: Path, *, check: bool = True) -> tuple[Header, dict[str, NDArr
     """
     import OpenEXR
 
-    header = read_header(path)
-    try:
-        with silent_library(), OpenEXR.File(str(path)) as file:
-            channels = {name: np.array(channel.pixels) for name, channel in file.channels().items()}
-    except (RuntimeError, ValueError, KeyError, IndexError, MemoryError) as error:
-        raise DamagedExrError("it cannot be read") from error
+    with local_copy(path) as here:
+        header = read_header(here)
+        try:
+            with silent_library(), OpenEXR.File(str(here)) as file:
+                channels = {name: np.array(channel.pixels) for name, channel in file.channels().items()}
+        except (RuntimeError, ValueError, KeyError, IndexError, MemoryError) as error:
+            raise DamagedExrError("it cannot be read") from error
     if check and DIGEST in header and header[DIGEST] != _digest(header, channels):
         raise DamagedExrError("its values are not those that were written")
     return header, channels
@@ -113,13 +114,13 @@ def _plain(value: Any) -> Any:
     return float(np.float32(value)) if isinstance(value, float) else value
 
 
-def _check_size(path: Path, header: Header) -> None:
+def _check_size(size: int, header: Header) -> None:
     low, high = header["dataWindow"]
     width, height = (int(high[i]) - int(low[i]) + 1 for i in (0, 1))
     channels = len(header["channels"])
     if width < 1 or height < 1 or width * height > MAX_PIXELS or not 1 <= channels <= MOST_CHANNELS:
         raise DamagedExrError(f"it claims {width} x {height} pixels of {channels} channels")
-    if 4 * width * height * channels > MOST_EXPANSION * path.stat().st_size:
+    if 4 * width * height * channels > MOST_EXPANSION * size:
         raise DamagedExrError(f"it claims {width} x {height} pixels, more than a file of its size can hold")
 
 

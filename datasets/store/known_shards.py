@@ -14,6 +14,7 @@ from typing import Any
 
 from datasets.store.atomic import write_text
 from datasets.store.manifest import Entry, shard_entry
+from datasets.url_path import UrlPath
 
 KNOWN_FILE = ".known-shards.json"
 FORM = {"path": str, "rows": int, "schema_version": str, "content": str}  # of an entry
@@ -32,13 +33,15 @@ def entries_of(root: Path, paths: Sequence[Path]) -> list[Entry]:
         place, mark = path.relative_to(root).as_posix(), _mark(path)
         noted = known.get(place)
         found[place] = noted if noted and mark and noted[0] == mark else (mark, shard_entry(root, path))
-    if found != known:
+    if found != known and any(mark for mark, _ in found.values()):
         write_text(root / KNOWN_FILE, json.dumps(found))
     return [entry for _, entry in found.values()]
 
 
 def _mark(path: Path) -> Mark:
-    """What tells a file from an earlier one of its name; nothing of one that is gone."""
+    """What tells a file from an earlier one of its name; nothing of one that is gone, or in an object store."""
+    if isinstance(path, UrlPath):
+        return []
     with suppress(OSError):
         told = path.stat()
         return [told.st_size, told.st_mtime_ns, told.st_ctime_ns, told.st_ino]

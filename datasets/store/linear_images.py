@@ -16,7 +16,7 @@ from datasets.errors import UserError
 from datasets.plan import Frame, plan
 from datasets.recipe.model import Recipe
 from datasets.recipe.targets import target_values
-from datasets.store.atomic import write_text
+from datasets.store.atomic import local_copy, write_text
 from datasets.store.exr_file import DamagedExrError, read_exr, read_header, write_exr
 from eposit import Camera
 from render.frame import LinearImage
@@ -70,12 +70,13 @@ def read_linear(path: Path, key: str = "", *, check: bool = True) -> LinearImage
     if not path.is_file():
         raise LinearImageError(f"{path} is missing; run the generate stage again to render it")
     try:
-        if read_header(path).get("key") != key:
-            raise ForeignImageError(
-                f"{path} belongs to another frame or recipe; `repair {path.parent.parent}` puts it aside and renders "
-                "the right one"
-            )
-        header, channels = read_exr(path, check=check)
+        with local_copy(path) as here:
+            if read_header(here).get("key") != key:
+                raise ForeignImageError(
+                    f"{path} belongs to another frame or recipe; `repair {path.parent.parent}` puts it aside and "
+                    "renders the right one"
+                )
+            header, channels = read_exr(here, check=check)
         stored = np.asarray(channels["Y" if "Y" in channels else "RGB"], np.float32)
         region = _region(header["dataWindow" if "background" in header else "region"])
         whole, background = _region(header["displayWindow"]), float(header.get("background", 0.0))

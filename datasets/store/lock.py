@@ -37,6 +37,7 @@ from pathlib import Path
 from datasets.errors import UserError
 from datasets.store.atomic import State, create_owned, host, own_name, state_of
 from datasets.store.refusals import refused
+from datasets.url_path import UrlPath
 
 LOCK_PREFIX = ".lock-"
 BEGIN_PREFIX = ".tmp-"  # a lock file until it is whole, swept like every temporary file
@@ -63,12 +64,18 @@ class Holder:
 def hold(root: Path, *, shared: bool = False) -> Iterator[None]:
     """Hold a dataset's folder, which is there, while the body runs.
 
+    Nobody holds one in an object store, which has no locks: there all share it, as the files of two who do the same
+    are the same.
+
     shared: others that hold it shared may stand beside; alone: nobody.
 
     Raises:
         HeldError: another holds it: who, since when and what to do.
         UserError: the folder cannot be written.
     """
+    if isinstance(root, UrlPath):
+        yield
+        return
     try:
         path, descriptor = _take(root, shared)
     except OSError as error:

@@ -12,14 +12,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import pyarrow.parquet as pq
-
 from datasets.recipe.model import Recipe
 from datasets.schema import TABLES
 from datasets.store.digest import combined_digest
 from datasets.store.provenance import Provenance
 from datasets.store.refusals import RECIPE_FILE, SHARD_NAME, damaged, unreadable
-from datasets.store.shard_file import DIGEST_KEY, UNREADABLE, VERSION_KEY
+from datasets.store.shard_file import DIGEST_KEY, UNREADABLE, VERSION_KEY, read_footer
 
 MANIFEST_FILE = "manifest.json"
 Entry = dict[str, Any]
@@ -32,7 +30,7 @@ def shard_entry(root: Path, path: Path) -> Entry:
         UserError: it cannot be read.
     """
     try:
-        footer = pq.read_metadata(path)
+        footer = read_footer(path)
     except PermissionError:
         raise unreadable(path) from None
     except UNREADABLE:

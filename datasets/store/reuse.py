@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import errno
 import os
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
 from datasets.errors import UserError
 from datasets.plan import shard_count, shard_frames
-from datasets.store.atomic import replace_atomically
+from datasets.store.atomic import copy_file
 from datasets.store.dataset import Dataset, open_dataset
 from datasets.store.linear_images import LinearImageError, are_kept, masters, read_linear, require_kept
 from datasets.store.refusals import missing, refused
+from datasets.url_path import UrlPath
 
 
 def reuse_linear_images(dataset: Dataset, source: Path) -> tuple[int, int]:
@@ -86,6 +86,9 @@ def _is_sound(path: Path, key: str) -> bool:
 
 def _link_or_copy(source: Path, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
+    if isinstance(path, UrlPath) or isinstance(source, UrlPath):
+        copy_file(source, path)
+        return
     try:
         os.link(source, path)
     except FileExistsError:  # another process of this dataset was first
@@ -93,5 +96,4 @@ def _link_or_copy(source: Path, path: Path) -> None:
     except OSError as error:  # another disk, or a file system or a policy without links
         if error.errno not in (errno.EXDEV, errno.EPERM, errno.EACCES, errno.EMLINK, errno.ENOTSUP, errno.ENOSYS):
             raise
-        with replace_atomically(path) as temporary:
-            shutil.copyfile(source, temporary)
+        copy_file(source, path)

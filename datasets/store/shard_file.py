@@ -11,6 +11,7 @@ keys and values. Parquet's checksums of pages are written, too: a damaged page i
 from __future__ import annotations
 
 import json
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from datasets.store.digest import column_digest, text_digest
 from datasets.store.nulls import is_list_of_floats
 from datasets.store.parquet_footer import stored_columns
 from datasets.store.texts import longest
+from datasets.url_path import UrlPath
 
 RECIPE_KEY, VERSION_KEY, DIGEST_KEY = b"recipe", b"schema_version", b"content"
 PLACE_KEY = b"place"  # table and name of the file, so that a shard under another's name is known
@@ -69,6 +71,21 @@ def write_rows(path: Path, table: str, rows: pa.Table, footer: dict[str, str]) -
         writer.add_key_value_metadata(told | {CHECKS_KEY.decode(): " ".join(digests)})
 
 
+def read_footer(path: Path) -> pq.FileMetaData:
+    """What the end of a Parquet file says.
+
+    Raises:
+        UNREADABLE: it cannot be read.
+    """
+    with _readable(path) as source:
+        return pq.read_metadata(source)
+
+
+def _readable(path: Path) -> AbstractContextManager[Any]:
+    """What pyarrow reads a file from: its path, or its ranges in an object store."""
+    return path.open("rb") if isinstance(path, UrlPath) else nullcontext(path)
+
+
 def read_rows(
     path: Path, columns: list[str] | None = None, *, check: bool = True, most_rows: int | None = None
 ) -> pa.Table:
@@ -85,13 +102,13 @@ def read_rows(
     schema = TABLES[path.parent.name]
     if not path.is_file():
         raise FileNotFoundError(path) if not path.exists() else DamagedShardError("it is no file")
-    metadata = pq.read_metadata(path)
+    metadata = read_footer(path)
     _check_size(path, metadata, most_rows)
     texts = [
         name for name in metadata.schema.names if name in schema.names and pa.types.is_string(schema.field(name).type)
     ]
     options: dict[str, Any] = {"metadata": metadata, "page_checksum_verification": check, "read_dictionary": texts}
-    with pq.ParquetFile(path, **options) as file:
+    with _readable(path) as source, pq.ParquetFile(source, **options) as file:
         names, footer = file.schema_arrow.names, file.metadata.metadata or {}
         if VERSION_KEY in footer and version_of(footer) not in READABLE:
             raise UnknownVersionError(version_of(footer))

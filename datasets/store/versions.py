@@ -6,14 +6,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from datasets.plan import shard_count
 from datasets.recipe.model import Recipe
 from datasets.schema import LATER_COLUMNS, SCORES_ADDED, TABLES
 from datasets.store.nulls import with_nulls
 from datasets.store.refusals import SHARD_NAME
-from datasets.store.shard_file import RECIPE_KEY, UNREADABLE, has_digests
+from datasets.store.shard_file import RECIPE_KEY, UNREADABLE, has_digests, read_footer
 
 OLD_SHARD_FRAMES = 10  # of a recipe without `shard_frames`, when the version was 2
 OLD_MOST_SHARD_FRAMES = 200  # of such a recipe, before large datasets of small pictures had more
@@ -67,7 +66,7 @@ def without_digests(root: Path) -> bool:
     for table in TABLES:
         for path in sorted((root / table).glob("[!.]*.parquet"))[:1]:
             try:
-                if not has_digests(pq.read_metadata(path).metadata or {}):
+                if not has_digests(read_footer(path).metadata or {}):
                     return True
             except UNREADABLE:
                 continue  # whoever reads the rows says what is wrong with it
@@ -79,7 +78,7 @@ def _carried(root: Path) -> Iterator[str]:
     for table in TABLES:
         for path in sorted((root / table).glob("[!.]*.parquet")):
             try:
-                yield (pq.read_metadata(path).metadata or {}).get(RECIPE_KEY, b"").decode("utf-8", "replace")
+                yield (read_footer(path).metadata or {}).get(RECIPE_KEY, b"").decode("utf-8", "replace")
                 break
             except UNREADABLE:
                 continue  # whoever reads the rows says what is wrong with it

@@ -47,7 +47,7 @@ def restore_recipe(root: Path) -> bool:
 def unreadable_recipe(root: Path) -> str | None:
     """What is wrong with a dataset's recipe where `restore_recipe` can mend it; None if it can be read."""
     try:
-        load_recipe(str(root / RECIPE_FILE))
+        load_recipe(root / RECIPE_FILE)
     except UserError as error:
         return f"{error}; `repair {root}` puts back the one that the manifest keeps" if kept_recipe(root) else None
     return None

@@ -11,8 +11,21 @@ from typing import Annotated
 
 import typer
 
-Out = Annotated[Path, typer.Option("--out", help="Folder of the dataset; a run that stopped is resumed there.")]
-Folder = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a dataset.")]
+from datasets.url_path import dataset_folder
+
+Out = Annotated[
+    Path,
+    typer.Option(
+        "--out",
+        metavar="DIR",
+        parser=dataset_folder,
+        help="Folder of the dataset, or a URL as s3://bucket/demo; a run that stopped is resumed there.",
+    ),
+]
+Folder = Annotated[
+    Path,
+    typer.Argument(metavar="DIR", parser=dataset_folder, help="Folder of a dataset, or its URL as s3://bucket/demo."),
+]
 RecipeName = Annotated[str, typer.Argument(metavar="RECIPE", help="A .toml file, or a name from `recipes`.")]
 ShownRecipe = Annotated[str | None, typer.Argument(metavar="[RECIPE]", help="Show its values beside the keys.")]
 FrameNumber = Annotated[int, typer.Argument(metavar="FRAME", help="Its frame_id.")]
@@ -38,7 +51,12 @@ Regime = Annotated[
     str | None, typer.Option(help="Sensor regime, as if the recipe said so: clean, typical, paper or harsh.")
 ]
 Reuse = Annotated[
-    Path | None, typer.Option(metavar="DIR", help="Dataset whose linear light is taken where it shows the same views.")
+    Path | None,
+    typer.Option(
+        metavar="DIR",
+        parser=dataset_folder,
+        help="Dataset whose linear light is taken where it shows the same views.",
+    ),
 ]
 
 NoMasters = Annotated[

@@ -10,6 +10,7 @@ from datasets.errors import UserError
 from datasets.plan import frame_count
 from datasets.recipe.model import Recipe
 from datasets.store.refusals import SHARD_NAME
+from datasets.url_path import UrlPath
 from pipelines.cost.choice import forecast_of
 from pipelines.cost.forecast import Forecast, lasting, sized
 from pipelines.stages.missing import Execution
@@ -53,9 +54,9 @@ def tell_cost(recipe: Recipe, out: Path, execution: Execution, start: Start) -> 
     told = f"{round(left * found.frames)} of {found.frames} frames to make, {found.shard_frames} in a shard"
     time = lasting(left * sum(found.stage_seconds[stage] for stage in start.stages))
     people = f"{workers} {'worker' if workers == 1 else 'workers'}"
-    size = f"{sized(wanted)} of the {sized(free)} that are free"
+    size = f"{sized(wanted)} of the {sized(free)} that are free" if free is not None else f"{sized(wanted)} to put"
     execution.console.print(f"{told}: about {time} with {people}, {size} (from {found.source})", soft_wrap=True)
-    if wanted * (1.0 + MARGIN) > free and not start.ignore_disk:
+    if free is not None and wanted * (1.0 + MARGIN) > free and not start.ignore_disk:
         raise _too_small(out, wanted, free, with_masters=start.with_masters)
 
 
@@ -67,8 +68,10 @@ def _too_small(out: Path, wanted: float, free: int, *, with_masters: bool) -> Us
     )
 
 
-def free_bytes(folder: Path) -> int:
-    """Bytes that this user may still write where a folder is, or will be."""
+def free_bytes(folder: Path) -> int | None:
+    """Bytes that this user may still write where a folder is, or will be; None of an object store."""
+    if isinstance(folder, UrlPath):
+        return None
     there = folder.absolute()
     while not there.exists():
         there = there.parent
@@ -86,6 +89,10 @@ def _bytes_left(found: Forecast, begun: Begun, left: float, stages: tuple[str, .
 
 def _begun(out: Path, size: int) -> Begun:
     """size: frames of a shard."""
-    paths = [path for path in (out / "frames").glob("*.parquet") if SHARD_NAME.fullmatch(path.name)]
-    held = sum(path.stat().st_size for path in paths)
-    return Begun(len(paths), held / (len(paths) * size) if paths else None)
+    folder = out / "frames"
+    if isinstance(folder, UrlPath):
+        sizes = folder.sizes()
+    else:
+        sizes = {path.name: path.stat().st_size for path in folder.glob("*.parquet")}
+    held = [count for name, count in sizes.items() if SHARD_NAME.fullmatch(name)]
+    return Begun(len(held), sum(held) / (len(held) * size) if held else None)

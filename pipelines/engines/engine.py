@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 from datasets.errors import UserError
+from datasets.url_path import UnreachableError
 from render.backend import BackendError
 
 MAX_WORKERS = 256
 TRIES = 2  # of a task that fails in a way that nobody expected
-FATAL = (UserError, BackendError, OSError)  # what every task would fail with
+FATAL = (UserError, BackendError, UnreachableError, OSError)  # what every task would fail with
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 

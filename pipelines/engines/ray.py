@@ -1,7 +1,7 @@
 """The engine of a Ray cluster: each task may run on any node, and runs again if its node is lost.
 
 This is the only file that imports Ray, and it does so when the engine is first used. Every node needs the same Python
-environment and checkout, and sees the dataset's folder under the same path.
+environment and checkout, and sees the dataset's folder under the same path, or reaches it by its URL.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ import numpy as np
 from eposit.arrays import Mask
 from pipelines.pages.numbers import with_interval
 from pipelines.report.data import EXACT, Series
-from pipelines.report.points import PointErrors
+from pipelines.report.frame_points import FramePoints
 from pipelines.report.run import Run, by_pose, counted, poses_of
 from pipelines.statistics import LEVEL, Interval, root, student
 
@@ -31,24 +31,23 @@ def attention(run: Run) -> Iterator[str]:
     yield from _dishonest_poses(run)
 
 
-def _not_found(run: Run, item: PointErrors) -> Iterator[str]:
-    seen = np.isfinite(item.error[..., 0])
-    lost = ~np.any(seen[:, :-1], axis=1) & np.any(item.in_image, axis=1)
+def _not_found(run: Run, item: FramePoints) -> Iterator[str]:
+    lost = ~item.boards & item.shows
     if np.any(lost):
         yield f"{item.detector} found no board in {counted(int(lost.sum()), 'frame')}: {_named(run, lost)}"
-    missing = item.in_image[:, :-1] & ~seen[:, :-1] & ~lost[:, None]
-    frames = np.any(missing, axis=1)
+    missing = np.where(lost, 0, item.visible - item.found)
+    frames = missing > 0
     if np.any(frames):
         told = f"{item.detector} left out {counted(int(missing.sum()), 'corner')} of boards that it found, in "
         yield told + f"{counted(int(frames.sum()), 'frame')}: {_named(run, frames)}"
-    circles = item.in_image[:, -1] & ~seen[:, -1] & ~lost
+    circles = item.circle_visible & ~item.circle & ~lost
     if np.any(circles):
         told = f"{item.detector} found the board and not the circle in {counted(int(circles.sum()), 'frame')}"
         yield f"{told}: {_named(run, circles)}"
 
 
-def _made_up(run: Run, item: PointErrors) -> Iterator[str]:
-    frames = np.any(item.made_up, axis=1)
+def _made_up(run: Run, item: FramePoints) -> Iterator[str]:
+    frames = item.made_up > 0
     if np.any(frames):
         told = f"{item.detector} found {counted(int(item.made_up.sum()), 'point')} that cannot be seen, in "
         yield told + f"{counted(int(frames.sum()), 'frame')}: {_named(run, frames)}"
@@ -68,10 +67,10 @@ def _failures(item: Series) -> Iterator[str]:
         yield f"{told}: frames {_listed(sorted(set(item.frame_id[item.ambiguous].tolist())))}"
 
 
-def _biased(run: Run, item: PointErrors) -> Iterator[str]:
+def _biased(run: Run, item: FramePoints) -> Iterator[str]:
     """Means that are not zero, at 5 % over all cameras and directions together (Bonferroni)."""
     cameras = dict.fromkeys(run.cameras.tolist())
-    kinds = (("x", item.error[:, :-1, 0]), ("y", item.error[:, :-1, 1]), ("the radius", item.radial[:, :-1]))
+    kinds = (("x", item.mean_x), ("y", item.mean_y), ("the radius", item.mean_radial))
     level = _shared(len(cameras) * len(kinds))
     for camera in cameras:
         own = run.cameras == camera
@@ -82,13 +81,13 @@ def _biased(run: Run, item: PointErrors) -> Iterator[str]:
                 yield f"{told} along {name}, more than chance explains"
 
 
-def _dishonest_points(run: Run, item: PointErrors) -> Iterator[str]:
+def _dishonest_points(run: Run, item: FramePoints) -> Iterator[str]:
     cameras = dict.fromkeys(run.cameras.tolist())
     level = _shared(2 * len(cameras))
     for camera in cameras:
         own = run.cameras == camera
-        for name, values in (("corners", item.normalised[own, :-1]), ("circles", item.normalised[own, -1:])):
-            over = root(student(by_pose(values**2, run.poses(own)), level))
+        for name, values in (("corners", item.normalised), ("circles", item.circle_normalised)):
+            over = root(student(by_pose(values[own], run.poses(own)), level))
             if _is_dishonest(over):
                 yield (
                     f"{name} of {item.detector} in {camera} are off by {with_interval(over)} times what the detection "

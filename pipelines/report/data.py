@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,6 +30,8 @@ ERRORS = {
 }
 SIGNED = tuple(name for name in ERRORS if name[:2] in ("rx", "ry", "rz", "tx", "ty", "tz"))
 SETTING = ("solver", "point_source", "assumed_camera", "point_set")
+NORMALISED = tuple(f"{component}_normalised" for component in COMPONENTS)
+SCORE_COLUMNS = ("frame_id", *SETTING, "status", "failure_reason", "gross_failure", "ambiguous", *ERRORS, *NORMALISED)
 EXACT = "exact"  # the assumed camera that is the true one
 
 
@@ -86,8 +88,30 @@ class Cell:
     errors: tuple[Error, ...]  # none if all failed
 
 
-def series(scores: pa.Table) -> list[Series]:
-    """One series for each setting, in the order of the table."""
+def series(tables: Iterable[pa.Table]) -> list[Series]:
+    """One series for each setting, in the order of its rows in tables of scores, which are looked at one by one."""
+    parts: dict[tuple[str, ...], list[Series]] = {}
+    for scores in tables:
+        for item in _series_of(scores):
+            parts.setdefault(tuple(item.key.values()), []).append(item)
+    return [_joined(own) for own in parts.values()]
+
+
+def _joined(parts: Sequence[Series]) -> Series:
+    """Some rows of a setting, and then others."""
+    return Series(
+        parts[0].name,
+        parts[0].key,
+        np.concatenate([part.frame_id for part in parts]),
+        {name: np.concatenate([part.errors[name] for part in parts]) for name in parts[0].errors},
+        np.concatenate([part.normalised for part in parts]),
+        np.concatenate([part.status for part in parts]),
+        np.concatenate([part.gross for part in parts]),
+        np.concatenate([part.ambiguous for part in parts]),
+    )
+
+
+def _series_of(scores: pa.Table) -> list[Series]:
     keys = list(zip(*(scores[name].to_pylist() for name in SETTING), strict=True))
     found: list[Series] = []
     for key in dict.fromkeys(keys):
@@ -98,7 +122,7 @@ def series(scores: pa.Table) -> list[Series]:
         gross, ambiguous = (
             np.array([bool(value) for value in part[name].to_pylist()], bool) for name in ("gross_failure", "ambiguous")
         )
-        normalised = numbers(part, *(f"{component}_normalised" for component in COMPONENTS))
+        normalised = numbers(part, *NORMALISED)
         named: dict[str, str] = dict(zip(SETTING, key, strict=True))
         frame_id = part["frame_id"].to_numpy()
         found.append(Series(" ".join(key), named, frame_id, errors, normalised, status, gross, ambiguous))

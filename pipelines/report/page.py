@@ -9,13 +9,13 @@ from datasets.store.atomic import write_text
 from datasets.store.dataset import RECIPE_FILE, Dataset
 from pipelines.detection import Detector
 from pipelines.machine import versions
-from pipelines.pages.frames import REGION
 from pipelines.pages.sections import Drawing
 from pipelines.pages.template import rendered
 from pipelines.report import figures, pictures
-from pipelines.report.data import Cell, Series, cells, normalised_rows, series
+from pipelines.report.data import Cell, Series, cells, normalised_rows
+from pipelines.report.gather import gathered
 from pipelines.report.pixel_bound import bound_rows
-from pipelines.report.points import PointErrors, field_rows, point_errors, tilt_rows
+from pipelines.report.point_tables import PointTally, field_rows, tilt_rows
 from pipelines.report.run import Run
 from pipelines.report.scenes import scenes
 from pipelines.report.summary import summarised
@@ -24,7 +24,6 @@ from pipelines.statistics import LEAST_FOR_TAIL
 
 REPORT = "report.html"
 TEMPLATE = Path(__file__).with_name("page.html")
-COLUMNS = ("frame_id", "pose_id", "time_s", "camera_name", "tilt_deg", "cx_px", "cy_px", *REGION)
 
 
 def write_report(dataset: Dataset) -> Path:
@@ -33,20 +32,17 @@ def write_report(dataset: Dataset) -> Path:
     Raises:
         UserError: a stage is missing or a shard damaged.
     """
-    frames = dataset.read("frames", list(COLUMNS)).to_pylist()
-    found = series(dataset.read("scores"))
-    # Who scores a whole system of their own may have detected nothing.
-    points = point_errors(dataset, frames) if dataset.shards("detections") else []
+    run, points = gathered(dataset)
     html = rendered(
         TEMPLATE,
         recipe=dataset.recipe,
         recipe_text=(dataset.root / RECIPE_FILE).read_text(encoding="utf-8"),
-        frames=frames,
-        summary=summarised(Run(dataset.recipe, frames, points, found)),
-        **_frames(dataset, frames, points, found),
+        frames=run.frames,
+        summary=summarised(run),
+        **_frames(dataset, run),
         scenes=[(scene, scene.link(REPORT)) for scene in scenes(dataset, REPORT)],
-        **_detection(points, frames),
-        **_poses(found, frames),
+        **_detection(points, run.frames),
+        **_poses(run.found, run.frames),
         bound=bound_table(bounds) if (bounds := bound_rows(dataset)) else None,
         versions=versions(),
     )
@@ -55,17 +51,17 @@ def write_report(dataset: Dataset) -> Path:
     return path
 
 
-def _frames(
-    dataset: Dataset, frames: list[dict[str, Any]], points: list[PointErrors], found: list[Series]
-) -> dict[str, Any]:
+def _frames(dataset: Dataset, run: Run) -> dict[str, Any]:
     """The frames that are shown, with the points of our detector, or of the first if ours has none."""
-    ours = [item for item in points if item.detector == Detector.EDGE_FIT]
-    item = next(iter(ours or points), None)
-    chosen = {"usual": pictures.usual(frames, item), "worst": pictures.worst(frames, item, found)}
-    return {name: pictures.drawings(dataset, frames, own, item, large=name == "usual") for name, own in chosen.items()}
+    ours = [item for item in run.points if item.detector == Detector.EDGE_FIT]
+    item = next(iter(ours or run.points), None)
+    chosen = {"usual": pictures.usual(run.frames, item), "worst": pictures.worst(run.frames, item, run.found)}
+    return {
+        name: pictures.drawings(dataset, run.frames, own, item, large=name == "usual") for name, own in chosen.items()
+    }
 
 
-def _detection(points: list[PointErrors], frames: list[dict[str, Any]]) -> dict[str, Any]:
+def _detection(points: list[PointTally], frames: list[dict[str, Any]]) -> dict[str, Any]:
     return {
         "detection": tilt_rows(points, frames),
         "detectors": len(points),

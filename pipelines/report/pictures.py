@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 
 from datasets.store.dataset import Dataset
-from eposit.arrays import Array
 from pipelines.pages.frames import crops, marks_by_frame
 from pipelines.pages.numbers import sensible
 from pipelines.pages.pictures import LARGE_PX, SMALL_PX, Drawn, Picture, Side, drawn
 from pipelines.report.data import EXACT, Series
-from pipelines.report.points import PointErrors
+from pipelines.report.frame_points import FramePoints
 
 MOST_CAMERAS, MOST_WORST = 8, 6
 
@@ -27,10 +26,10 @@ class Chosen:
     reason: str = ""
 
 
-def usual(frames: list[dict[str, Any]], item: PointErrors | None) -> list[Chosen]:
+def usual(frames: list[dict[str, Any]], item: FramePoints | None) -> list[Chosen]:
     """Of each camera the frame whose corner error is the median of its frames', or its middle frame without points."""
     cameras = np.array([frame["camera_name"] for frame in frames])
-    error = np.zeros(len(frames)) if item is None else _rms(item.error[:, :-1])
+    error = np.zeros(len(frames)) if item is None else np.sqrt(item.square)
     found: list[Chosen] = []
     for camera in list(dict.fromkeys(cameras.tolist()))[:MOST_CAMERAS]:
         own = np.flatnonzero((cameras == camera) & np.isfinite(error))
@@ -40,15 +39,14 @@ def usual(frames: list[dict[str, Any]], item: PointErrors | None) -> list[Chosen
     return found
 
 
-def worst(frames: list[dict[str, Any]], item: PointErrors | None, found: Sequence[Series]) -> list[Chosen]:
+def worst(frames: list[dict[str, Any]], item: FramePoints | None, found: Sequence[Series]) -> list[Chosen]:
     """Frames without a board or a pose, then those whose corners are off most, over what the detection states."""
     failed = _failures(frames, found)
-    lost = np.zeros(len(frames), bool) if item is None else ~np.any(np.isfinite(item.error[:, :-1, 0]), axis=1)
+    lost = np.zeros(len(frames), bool) if item is None else ~item.boards
     badness = 1e6 * lost + 1e3 * np.array([len(names) for names in failed])
     if item is not None:
-        size = _rms(item.normalised[:, :-1])
-        size = size if np.any(np.isfinite(size)) else _rms(item.error[:, :-1])
-        badness += np.nan_to_num(size)
+        size = item.normalised if np.any(np.isfinite(item.normalised)) else item.square
+        badness += np.nan_to_num(np.sqrt(size))
     order = np.argsort(-badness, kind="stable")[:MOST_WORST]
     return [
         Chosen(int(row), _reason(row, bool(lost[row]), failed[row], item))
@@ -58,7 +56,7 @@ def worst(frames: list[dict[str, Any]], item: PointErrors | None, found: Sequenc
 
 
 def drawings(
-    dataset: Dataset, frames: list[dict[str, Any]], chosen: Sequence[Chosen], item: PointErrors | None, large: bool
+    dataset: Dataset, frames: list[dict[str, Any]], chosen: Sequence[Chosen], item: FramePoints | None, large: bool
 ) -> list[Drawn]:
     """The frames with what was found in them, and the command that makes each again.
 
@@ -66,7 +64,7 @@ def drawings(
         UserError: a shard is damaged.
     """
     shown = crops(dataset, {frames[one.row]["frame_id"] for one in chosen})
-    marks = {} if item is None else marks_by_frame(dataset, item.detector)
+    marks = {} if item is None else marks_by_frame(dataset, item.detector, set(shown))
     found: list[Drawn] = []
     for one in chosen:
         frame = frames[one.row]
@@ -90,22 +88,13 @@ def _failures(frames: list[dict[str, Any]], found: Sequence[Series]) -> list[lis
     return names
 
 
-def _reason(row: int, lost: bool, failed: list[str], item: PointErrors | None) -> str:
+def _reason(row: int, lost: bool, failed: list[str], item: FramePoints | None) -> str:
     if lost:
         return "no board was found"
     if failed:
         return f"no pose by {', '.join(failed)}"
     if item is None:
         return ""
-    length = np.linalg.norm(item.error[row, :-1], axis=-1)
-    stated = _rms(item.normalised[row : row + 1, :-1])[0]
-    told = f"corner {int(np.nanargmax(length))} is off by {sensible(float(np.nanmax(length)))} px"
+    stated = float(np.sqrt(item.normalised[row]))
+    told = f"corner {item.largest_corner[row]} is off by {sensible(float(item.largest[row]))} px"
     return told + (f"; all corners by {stated:.2f} times what is stated" if np.isfinite(stated) else "")
-
-
-def _rms(values: Array) -> Array:
-    """(f,) of (f, n, 2) values, NaN where a frame has none."""
-    flat = values.reshape(len(values), -1)
-    count = np.sum(np.isfinite(flat), axis=1)
-    with np.errstate(invalid="ignore"):
-        return np.sqrt(np.nansum(flat**2, axis=1) / count)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from datasets.rows import POSITION_COLUMNS, QUATERNION_COLUMNS, pose_covariances, poses
 from datasets.store.dataset import Dataset
-from eposit.arrays import Array
+from eposit.arrays import Array, Mask
 from eposit.pose import rotation_error_vector
 from pipelines.report.data import SETTING
 
@@ -24,11 +27,50 @@ def bound_rows(dataset: Dataset) -> list[dict[str, Any]]:
     """
     if not dataset.shards("bounds"):
         return []
-    bounds = dataset.read("bounds")
+    dataset.whole("bounds")
+    sums: dict[tuple[str, str], _Sums] = {}
+    for path in dataset.whole("estimates"):
+        for key, own, squares, inside in _by_setting(dataset, path):
+            sums.setdefault(key, _Sums()).add(squares[own], inside[own])
+    return [
+        {"setting": key[0], "camera": key[1], "n": item.count, "over": item.over, "covered": item.covered}
+        for key, item in sums.items()
+        if item.count
+    ]
+
+
+@dataclass(slots=True)
+class _Sums:
+    """Of one setting and camera, over the frames that were solved."""
+
+    count: int = 0
+    squares: float = 0.0
+    inside: float = 0.0  # NaN where no deviations are stated
+
+    def add(self, squares: Array, inside: Array) -> None:
+        known = np.isfinite(squares)
+        self.count += int(np.sum(known))
+        self.squares += float(np.sum(squares[known]))
+        self.inside += float(np.sum(inside[known]))
+
+    @property
+    def over(self) -> float:
+        """The root mean square."""
+        return float(np.sqrt(self.squares / self.count))
+
+    @property
+    def covered(self) -> float | None:
+        """The share; None where it is not known."""
+        return self.inside / self.count if np.isfinite(self.inside) else None
+
+
+def _by_setting(dataset: Dataset, path: Path) -> Iterator[tuple[tuple[str, str], Mask, Array, Array]]:
+    """Of a shard of estimates, for each setting and camera: these, its rows, and all rows' squares and shares."""
+    estimates = dataset.read_shard(path)
+    bounds = dataset.read_shard(dataset.sibling(path, "bounds"))
     bound = dict(zip(bounds["frame_id"].to_pylist(), pose_covariances(bounds), strict=True))
-    frames = dataset.read("frames", ["frame_id", "camera_name", *POSE])
+    frames = dataset.read_shard(dataset.sibling(path, "frames"), ["frame_id", "camera_name", *POSE])
     place = {frame: i for i, frame in enumerate(frames["frame_id"].to_pylist())}
-    estimates = dataset.read("estimates")
     settings = [" ".join(key) for key in zip(*(estimates[name].to_pylist() for name in SETTING), strict=True)]
     ids = estimates["frame_id"].to_pylist()
     truth = poses(frames.take([place[frame] for frame in ids]))
@@ -38,14 +80,8 @@ def bound_rows(dataset: Dataset) -> list[dict[str, Any]]:
     keys = [(setting, camera[place[frame]]) for setting, frame in zip(settings, ids, strict=True)]
     squares = _squares(error, np.array([bound[frame] for frame in ids]))
     inside = _inside(error, pose_covariances(estimates))
-    rows: list[dict[str, Any]] = []
     for key in dict.fromkeys(keys):
-        own = np.array([other == key for other in keys]) & np.isfinite(squares)
-        if np.any(own):
-            over = float(np.sqrt(np.mean(squares[own])))
-            covered = float(np.mean(inside[own])) if np.all(np.isfinite(inside[own])) else None
-            rows.append({"setting": key[0], "camera": key[1], "n": int(own.sum()), "over": over, "covered": covered})
-    return rows
+        yield key, np.array([other == key for other in keys]), squares, inside
 
 
 def _squares(error: Array, bound: Array) -> Array:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from datasets.recipe.model import Recipe
 from eposit.arrays import Array, Mask
 from pipelines.report.data import Series, frame_means
-from pipelines.report.points import PointErrors
+from pipelines.report.frame_points import FramePoints
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +20,7 @@ class Run:
 
     recipe: Recipe
     frames: list[dict[str, Any]]  # rows of `frames`
-    points: list[PointErrors]  # one a detector, none if nothing was detected
+    points: list[FramePoints]  # one a detector, none if nothing was detected
     found: list[Series]
 
     @property

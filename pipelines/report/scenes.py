@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 from datasets.rows import decode_image
 from datasets.store.dataset import RECIPE_FILE, Dataset, open_dataset
+from pipelines.pages.frames import rows_of
 from pipelines.pages.pictures import jpeg_address
-from pipelines.report.data import series
-from pipelines.report.points import point_errors
-from pipelines.report.run import Run
+from pipelines.report.gather import gathered
 from pipelines.report.summary import summarised
 
 PICTURE_PX = 480  # the longest side as shown
@@ -50,15 +50,17 @@ def scenes(dataset: Dataset, report: str) -> list[Scene]:
 
 
 def _scene(dataset: Dataset) -> Scene:
-    frames = dataset.read("frames").to_pylist()
-    points = point_errors(dataset, frames) if dataset.shards("detections") else []
-    summary = summarised(Run(dataset.recipe, frames, points, series(dataset.read("scores"))))
-    first = {frame["camera_name"]: frame for frame in reversed(frames)}
-    shown = [_shown(dataset, frame) for frame in sorted(first.values(), key=lambda frame: frame["frame_id"])]
+    run, _ = gathered(dataset)
+    summary = summarised(run)
+    first = {frame["camera_name"]: frame for frame in reversed(run.frames)}
+    shown = list(_shown(dataset, {frame["frame_id"]: frame for frame in first.values()}))
     return Scene(dataset.root.name, dataset.recipe.description, (summary.sentence, *summary.facts), tuple(shown))
 
 
-def _shown(dataset: Dataset, frame: dict[str, Any]) -> ShownPicture:
-    image = decode_image(frame["image"], dataset.root, frame["frame_id"], in_colour=True)
-    told = f"frame {frame['frame_id']}, tilt {frame['tilt_deg']:.0f}°"
-    return ShownPicture(frame["camera_name"], told, jpeg_address(image, PICTURE_PX))
+def _shown(dataset: Dataset, frames: dict[int, dict[str, Any]]) -> Iterator[ShownPicture]:
+    """The whole pictures of some frames, by number, in their order."""
+    for row, path in rows_of(dataset, "frames", ["image"], frames):
+        frame = frames[row["frame_id"]]
+        image = decode_image(row["image"], path, row["frame_id"], in_colour=True)
+        told = f"frame {row['frame_id']}, tilt {frame['tilt_deg']:.0f}°"
+        yield ShownPicture(frame["camera_name"], told, jpeg_address(image, PICTURE_PX))

@@ -12,7 +12,7 @@ from eposit.arrays import Array
 from pipelines.pages.numbers import share, with_interval
 from pipelines.report.attention import attention
 from pipelines.report.data import Series
-from pipelines.report.points import PointErrors
+from pipelines.report.frame_points import FramePoints
 from pipelines.report.run import Run, by_pose, counted, poses_of
 from pipelines.statistics import FEW, Interval, bootstrap, median, root, student, wilson
 from render.sensor.presets import regime_of
@@ -58,30 +58,27 @@ def _rendered(run: Run) -> str:
     )
 
 
-def _detected(run: Run, item: PointErrors) -> Iterator[str]:
-    seen = np.isfinite(item.error[..., 0])
-    visible = np.any(item.in_image, axis=1)
-    boards, corners = np.any(seen[visible, :-1], axis=1), seen[:, :-1] & item.in_image[:, :-1]
-    circles, there = seen[item.in_image[:, -1], -1], item.in_image[:, :-1]
+def _detected(run: Run, item: FramePoints) -> Iterator[str]:
+    boards, circles = item.boards[item.shows], item.circle[item.circle_visible]
     if not len(boards):
         yield f"{item.detector} had no board to find: none can be seen."
         return
     yield (
         f"{item.detector} found {np.sum(boards)} of {counted(len(boards), 'board')} ({share(wilson(boards))}), "
-        f"{np.sum(corners)} of the {counted(int(np.sum(there)), 'corner')} that can be seen, and "
+        f"{np.sum(item.found)} of the {counted(int(np.sum(item.visible)), 'corner')} that can be seen, and "
         f"{np.sum(circles)} of {counted(len(circles), 'circle')}."
     )
     if not np.any(boards):
         return
-    poses = run.poses(np.ones(len(seen), bool))
-    rms = root(student(by_pose(item.error[:, :-1] ** 2, poses)))
+    poses = run.poses(np.ones(len(item.corners), bool))
+    rms = root(student(by_pose(item.square, poses)))
     bias = {
-        "x": _bias(item.error[:, :-1, 0], poses),
-        "y": _bias(item.error[:, :-1, 1], poses),
-        "the radius": _bias(item.radial[:, :-1], poses),
+        "x": _bias(item.mean_x, poses),
+        "y": _bias(item.mean_y, poses),
+        "the radius": _bias(item.mean_radial, poses),
     }
     told = ", ".join(f"{with_interval(found, True)} px along {name}" for name, found in bias.items())
-    normalised = root(student(by_pose(item.normalised[:, :-1] ** 2, poses)))
+    normalised = root(student(by_pose(item.normalised, poses)))
     stated = f" It is {with_interval(normalised)} times what the detection states." if normalised.value > 0.0 else ""
     yield f"Corner error by {item.detector}: {with_interval(rms)} px RMS per axis.{stated} Bias: {told}."
 

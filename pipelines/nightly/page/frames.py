@@ -44,8 +44,9 @@ def pictures_of(
         UserError: a shard is damaged.
         KeyError: a dataset lacks a frame.
     """
-    before, after = (marks_by_frame(side, detector) for side in (old, new))
-    shown = crops(new, {item.frame_id for item in wanted})
+    ids = {item.frame_id for item in wanted}
+    before, after = (marks_by_frame(side, detector, ids) for side in (old, new))
+    shown = crops(new, ids)
     found: list[Picture] = []
     for item in wanted:
         crop = shown[item.frame_id]

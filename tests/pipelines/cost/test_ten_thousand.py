@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import platform
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -66,6 +69,9 @@ The last thousand frames took {ratio} of the processor time of the first, all st
 thousand loads and compiles what it needs. Memory grew by {growth:+.0f} MB from the first thousand frames of `generate`
 to the last of `score`, by {own:+.0f} MB at most within a stage. Writing the manifest, at the end of each stage, is in
 none of the rows; it reads the footers of new shards only. `verify` passes what was made.
+
+`report` in a process of its own goes through the shards and keeps a few numbers of each frame. It had {few:.0f} MB at
+most with a thousand frames of this kind and {all:.0f} MB with all of them: {more:+.0f} MB.
 """
 
 
@@ -95,12 +101,11 @@ def test_memory_stays_and_the_last_thousand_frames_are_as_fast_as_the_first(tmp_
     recipe, engine = parse_recipe(RECIPE, "test"), Watched()
     execution = Execution(engine, Console(quiet=True))
     settings = run_settings(recipe.target)
-    with claim(tmp_path / "out", recipe, RECIPE, keep_masters=False) as dataset:
-        stages.run_generate(dataset, execution)
-        stages.run_detect(dataset, execution)
-        stages.run_estimate(dataset, settings, execution)
-        stages.run_score(dataset, execution)
+    dataset = made(tmp_path / "out", RECIPE, execution)
     assert verify(dataset)[1] == []
+    fewer = RECIPE.replace("count = 10000", "count = 1000")
+    few = made(tmp_path / "few", fewer, Execution(Watched(), execution.console))
+    peaks = [report_peak_mb(each.root) for each in (few, dataset)]
     shards = shard_count(recipe)
     names = ["generate", "detect", *(f"estimate {setting.name}" for setting in settings), "score"]
     found = dict(zip(names, engine.notes, strict=True))
@@ -109,11 +114,31 @@ def test_memory_stays_and_the_last_thousand_frames_are_as_fast_as_the_first(tmp_
         found[f"score {setting.name}"] = score[i * shards : (i + 1) * shards]
     own = max(notes[-1][1] - notes[0][1] for notes in found.values())
     growth = score[-1][1] - found["generate"][0][1]
-    write_text(PAGE, _page(found, growth, own, shards))
+    write_text(PAGE, _page(found, growth, own, shards, peaks))
     assert own < MOST_GROWTH_MB
+    assert peaks[1] - peaks[0] < MOST_GROWTH_MB
 
 
-def _page(found, growth, own, shards) -> str:
+def made(root, text, execution):
+    """A dataset after every stage but the report."""
+    recipe = parse_recipe(text, "test")
+    with claim(root, recipe, text, keep_masters=False) as dataset:
+        stages.run_generate(dataset, execution)
+        stages.run_detect(dataset, execution)
+        stages.run_estimate(dataset, run_settings(recipe.target), execution)
+        stages.run_score(dataset, execution)
+    return dataset
+
+
+def report_peak_mb(root):
+    """The most memory that writing a dataset's report takes, MB."""
+    running = subprocess.Popen([sys.executable, "-m", "pipelines", "report", str(root)])
+    _, status, used = os.wait4(running.pid, 0)
+    assert status == 0
+    return used.ru_maxrss / 1024.0
+
+
+def _page(found, growth, own, shards, peaks) -> str:
     rows = ["| stage | first thousand, s | second, s | last, s | memory after the first, MB | after the last, MB |"]
     rows.append("|---|--:|--:|--:|--:|--:|")
     for name, notes in found.items():
@@ -130,4 +155,7 @@ def _page(found, growth, own, shards) -> str:
         ratio=f"{last / first:.3f}",
         growth=growth,
         own=own,
+        few=peaks[0],
+        all=peaks[1],
+        more=peaks[1] - peaks[0],
     )

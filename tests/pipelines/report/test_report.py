@@ -8,7 +8,8 @@ from datasets.store.dataset import open_dataset
 from datasets.store.images import decode_png
 from pipelines.report.data import ERRORS, Series, cells, normalised_rows, series
 from pipelines.report.page import REPORT, write_report
-from pipelines.report.points import field_rows, point_errors, tilt_rows
+from pipelines.report.point_tables import field_rows, tallied, tilt_rows
+from pipelines.report.points import point_errors
 from tests.pipelines.pages.parsed import Page, assert_named_for_a_screen_reader
 
 
@@ -60,7 +61,7 @@ def test_failures_are_counted_and_kept_out_of_medians(tiny):
     scores = dataset.read("scores")
     frames = dataset.read("frames", ["frame_id", "camera_name", "tilt_deg"]).to_pylist()
     cameras = {frame["frame_id"]: frame["camera_name"] for frame in frames}
-    found = series(scores)
+    found = series([scores])
     rows = cells(found, cameras)
     assert sum(row.n for row in rows) == scores.num_rows
     for item in found:
@@ -107,7 +108,8 @@ def test_detection_tables_count_every_board_and_corner(tiny):
     dataset = open_dataset(root)
     frames = dataset.read("frames", FRAME_COLUMNS).to_pylist()
     errors = point_errors(dataset, frames)
-    rows, corners = tilt_rows(errors, frames), field_rows(errors, frames)
+    points = [tallied(item, frames) for item in errors]
+    rows, corners = tilt_rows(points, frames), field_rows(points, frames)
     assert [item.detector for item in errors] == ["edge-fit"]
     assert sum(row["frames"] for row in rows) == len(frames)
     assert all(row["boards"] <= row["frames"] for row in rows)
@@ -139,6 +141,6 @@ def test_point_errors_are_the_tables_differences(tiny):
 
 def test_normalised_errors_are_shown_where_they_are_stated(tiny):
     _, root = tiny
-    names = [row["setting"] for row in normalised_rows(series(open_dataset(root).read("scores")))]
+    names = [row["setting"] for row in normalised_rows(series(open_dataset(root).each_shard("scores")))]
     assert "best detected exact all" in names
     assert not any(name.startswith("eposit") or " truth " in name for name in names)

@@ -7,6 +7,7 @@ import pytest
 
 from datasets.recipe.model import load_recipe
 from pipelines.report.data import ERRORS, Series
+from pipelines.report.frame_points import by_frame
 from pipelines.report.points import PointErrors
 from pipelines.report.run import Run
 from pipelines.report.summary import summarised
@@ -47,6 +48,10 @@ def _run(seed=0):
     return Run(load_recipe("demo")[0], FRAMES, [_points(seed)], [_scores(seed)])
 
 
+def _summary(run):
+    return summarised(replace(run, points=[by_frame(item) for item in run.points]))
+
+
 def _moved(item, own, step):
     error = item.error.copy()
     error[own, :-1] += step
@@ -54,7 +59,7 @@ def _moved(item, own, step):
 
 
 def test_a_run_as_it_should_be_is_told_in_sentences():
-    found = summarised(_run())
+    found = _summary(_run())
     assert found.attention == ()
     assert found.sentence.startswith("Nothing stands out: every board was found")
     rendered, boards, corners, poses, failed = found.facts
@@ -72,7 +77,7 @@ def test_a_run_as_it_should_be_is_told_in_sentences():
 
 def test_chance_alone_calls_for_attention_in_few_runs():
     """Four kinds of tests at 5 % each, of which two look outside 0.8 to 1.3 only: at most a tenth, here with margin."""
-    called = [bool(summarised(_run(seed)).attention) for seed in range(100)]
+    called = [bool(_summary(_run(seed)).attention) for seed in range(100)]
     assert np.mean(called) <= 0.1 + 2.0 * 0.03  # two standard errors of a rate of 0.1 over 100 runs
 
 
@@ -146,7 +151,7 @@ def _wrong_poses(run):
     ids=lambda item: item.__name__ if callable(item) else "",
 )
 def test_each_fault_deserves_attention(plant, told):
-    found = summarised(plant(_run()))
+    found = _summary(plant(_run()))
     assert len(found.attention) == len(told)
     for one, wanted in zip(found.attention, told, strict=True):
         assert one.startswith(wanted)
@@ -156,13 +161,13 @@ def test_each_fault_deserves_attention(plant, told):
 def test_another_camera_than_the_true_one_may_be_off():
     run = _run()
     nominal = _wrong_poses(replace(run, found=[_scores(0, ("eposit", "detected", "nominal", "four"))]))
-    assert summarised(nominal).attention == ()
+    assert _summary(nominal).attention == ()
 
 
 def test_a_run_without_detections_or_covariances_has_its_sentences():
     item = replace(_scores(0), normalised=np.full((len(FRAMES), 6), np.nan))
-    found = summarised(replace(_run(), points=[], found=[item]))
+    found = _summary(replace(_run(), points=[], found=[item]))
     assert found.attention == ()
     assert found.facts[1].endswith("no standard deviations are stated.")
     lost = replace(item, status=np.full(len(FRAMES), "no_solution", "U20"))
-    assert summarised(replace(_run(), points=[], found=[lost])).facts[-1] == "16 of 16 estimates by 1 setting failed."
+    assert _summary(replace(_run(), points=[], found=[lost])).facts[-1] == "16 of 16 estimates by 1 setting failed."
