@@ -29,6 +29,7 @@ class Corners:
     contrast: float  # median difference between white and black, grey values
     board: BoardMap  # through the consistent ones
     exponent: float = 1.0  # of the picture's tone curve, see `tone_curve`
+    scatter: float = 1.0  # factor, in the covariances, of what the corners' own pixels state, see `corner_scatter`
 
 
 def drop_inconsistent(corners: Corners, at: Array, size: tuple[int, int]) -> Corners:
@@ -43,7 +44,7 @@ def drop_inconsistent(corners: Corners, at: Array, size: tuple[int, int]) -> Cor
         return agreed
     parts = (at, agreed.points_px - agreed.board(at), agreed.covariance_px2, agreed.board.slopes(at))
     factor = scatter_of_neighbours(*(part[good] for part in parts))
-    return replace(agreed, covariance_px2=agreed.covariance_px2 * factor)
+    return replace(agreed, covariance_px2=agreed.covariance_px2 * factor, scatter=factor)
 
 
 def _agreeing(corners: Corners, at: Array, size: tuple[int, int]) -> Corners:
