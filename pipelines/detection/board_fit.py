@@ -27,7 +27,6 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from eposit.arrays import Array
-from pipelines.detection.board_map import BoardMap
 from pipelines.detection.consistency import Corners
 from pipelines.detection.corner_scatter import orthonormal
 from pipelines.detection.print_scatter import with_print_scatter

@@ -15,6 +15,7 @@ from datasets.plan import shard_count
 from datasets.rows import decode_image, table
 from datasets.schema import DETECTIONS
 from datasets.store.dataset import Dataset
+from eposit.arrays import Array
 from pipelines.detection import Detector, detect_points
 
 
@@ -56,7 +57,15 @@ def run_shard(dataset: Dataset, index: int, advance: Callable[[], None] = lambda
             "status": found.status,
             "finder": np.full(n, found.finder),
             "blur_px": np.full(n, found.blur_px),
+            "joint_factor_px": _lists(found.joint_factor, n),
         }
         parts.append(table(DETECTIONS, columns))
         advance()
     dataset.write_shard(path_of(dataset, index, detector), pa.concat_tables(parts))
+
+
+def _lists(factor: Array | None, n: int) -> list[Array | None]:
+    """Rows of (n, 2, k) as lists; None for those of NaN."""
+    if factor is None:
+        return [None] * n
+    return [row.ravel() if np.all(np.isfinite(row)) else None for row in factor]
