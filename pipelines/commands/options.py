@@ -60,7 +60,12 @@ IgnoreDisk = Annotated[
     bool, typer.Option("--ignore-disk", help="Begin even where the disk looks too small for what is still to be made.")
 ]
 
-DetectorName = Annotated[str, typer.Option("--detector", help="edge-fit (ours), opencv-subpix or opencv-sb.")]
+DetectorName = Annotated[
+    str,
+    typer.Option(
+        "--detector", help="edge-fit (ours), board-fit (a smooth map through its corners), opencv-subpix or opencv-sb."
+    ),
+]
 OWN = "or your own as package.module:function."
 SOLVERS_HELP = (
     "best, centred, eposit, posit, opnp, gpnpf, pnpfr, released, opencv-sqpnp, opencv-epnp, opencv-iterative, "

@@ -138,7 +138,10 @@ def _smoothed(found: Detection, corners: Corners, ids: NDArray[np.int64], at: Ar
     is_ok = found.status == PointStatus.OK
     if not np.any(corners.consistent):
         return found
-    fit = fit_board(corners, at)
+    try:
+        fit = fit_board(corners, at)
+    except np.linalg.LinAlgError:  # covariances without an inverse
+        return _nothing(len(is_ok), PointStatus.CORNERS_INCONSISTENT, found.finder)
     good = ids[corners.consistent]
     alone = np.setdiff1d(np.flatnonzero(is_ok), good)
     points, rank = found.points_px.copy(), fit.factor.shape[2]

@@ -222,7 +222,9 @@ def test_a_hidden_circle_leaves_the_corners(demo):
 
 
 def test_an_unknown_detector_is_named_with_the_known_ones(demo):
-    with pytest.raises(ValueError, match=r"unknown detector 'ours'; choose one of edge-fit, board-fit, opencv-subpix"):
+    with pytest.raises(
+        ValueError, match=r"unknown detector 'ours'; choose one of edge-fit, board-fit, opencv-subpix, opencv-sb"
+    ):
         detect_points(demo[0][1], TARGET, "ours")
 
 
