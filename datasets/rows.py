@@ -133,6 +133,22 @@ def covariances_by_frame(rows: pa.Table, target: Target) -> dict[int, Array]:
     return {int(frame[i * count]): found[i] for i in range(len(found))}
 
 
+def joint_factors_by_frame(rows: pa.Table, target: Target) -> dict[int, Array]:
+    """frame_id to (n, 2, k) px from rows of `detections`, where a frame has factors; NaN where a point has none."""
+    count, lists = len(target.points), rows["joint_factor_px"].combine_chunks()
+    if lists.null_count == len(lists):
+        return {}
+    frame, found = rows["frame_id"].to_numpy(), {}
+    for start in range(0, len(lists), count):
+        part = lists.slice(start, count)
+        there = part.is_valid().to_numpy(zero_copy_only=False)
+        if np.any(there):
+            values = with_nans(part.drop_null().flatten()).reshape(int(np.sum(there)), 2, -1)
+            found[int(frame[start])] = np.full((count, *values.shape[1:]), np.nan)
+            found[int(frame[start])][there] = values
+    return found
+
+
 def points_by_frame(rows: pa.Table, target: Target) -> dict[int, Array]:
     """frame_id to (n, 2) px from a long table of points; NaN where there is none."""
     count = len(target.points)

@@ -139,14 +139,14 @@ KEYPOINTS = pa.schema(
 # Columns that older datasets do not have. Where one holds nothing it takes no part in a table's hash, so that a dataset
 # without a world has the hash it always had.
 LATER_COLUMNS = frozenset({
-    "truth", "visible", "ambiguous", "covariance_unreliable", *MOTION_COLUMNS,
+    "truth", "visible", "ambiguous", "covariance_unreliable", "joint_factor_px", *MOTION_COLUMNS,
     *(field.name for field in _world_fields()),
 })  # fmt: skip
 
 DETECTIONS = pa.schema(
     [
         _field("frame_id", pa.int64(), "frame"),
-        _field("detector", pa.string(), "what placed the corners: edge-fit, opencv-subpix or opencv-sb"),
+        _field("detector", pa.string(), "what placed the corners: edge-fit, board-fit, opencv-subpix or opencv-sb"),
         _field("point_id", pa.int32(), "point, as in keypoints"),
         *_floats(
             {
@@ -160,6 +160,12 @@ DETECTIONS = pa.schema(
         _field("status", pa.string(), _STATUS),
         _field("finder", pa.string(), "finder that saw the board; empty if none"),
         _field("blur_px", pa.float64(), "median blur of the board's edges"),
+        _field(
+            "joint_factor_px",
+            pa.list_(pa.field("element", pa.float64())),
+            "of board-fit: a matrix of 2 x k, row by row; the covariance of two points of a frame is that of one times "
+            "that of the other transposed. Null: a point whose error is taken for independent of the others', or none",
+        ),
     ]
 )
 

@@ -16,7 +16,7 @@ import pyarrow as pa
 
 from datasets.schema import LATER_COLUMNS
 from datasets.store.images import decode_pixels
-from datasets.store.nulls import is_list_of_floats, with_nans
+from datasets.store.nulls import is_list_of_floats, is_ragged_list_of_floats, with_nans
 
 SHORT_DIGEST = (
     6  # bytes, eight letters of base 64: against damage, not against forgers: one of 2^48 damages goes unseen
@@ -99,6 +99,13 @@ def _floats(column: Any) -> Iterator[bytes]:
     yield np.where(np.isnan(values), np.nan, values + 0.0).tobytes()  # one NaN, one zero
 
 
+def _ragged_floats(column: Any) -> Iterator[bytes]:
+    """The lists' lengths, -1 for a null, and then all their values."""
+    lengths = column.value_lengths().fill_null(-1)
+    yield np.asarray(lengths.to_numpy(zero_copy_only=False), dtype="<i8").tobytes()
+    yield from _floats(column.drop_null().flatten())
+
+
 def _whole_numbers(column: Any) -> Iterator[bytes]:
     """Integers or booleans; nulls count as 0, behind a mask that tells them from it."""
     if column.null_count:
@@ -116,6 +123,7 @@ FORMS: tuple[tuple[Callable[[pa.DataType], bool], Callable[[Any], Iterator[bytes
     (pa.types.is_struct, _images),
     (pa.types.is_floating, _floats),
     (is_list_of_floats, _floats),
+    (is_ragged_list_of_floats, _ragged_floats),
     (pa.types.is_integer, _whole_numbers),
     (pa.types.is_boolean, _whole_numbers),
     (pa.types.is_string, _texts),

@@ -39,5 +39,10 @@ def is_list_of_floats(kind: pa.DataType) -> bool:
     return pa.types.is_fixed_size_list(kind) and pa.types.is_floating(kind.value_type)
 
 
+def is_ragged_list_of_floats(kind: pa.DataType) -> bool:
+    """Whether values of a type are lists of any number of floats. They hold no NaN; what is not there is a null."""
+    return pa.types.is_list(kind) and pa.types.is_floating(kind.value_type)
+
+
 def _null_where_nan(values: Array, kind: pa.DataType) -> pa.Array:
     return pa.array(values, type=kind, mask=np.isnan(values))

@@ -6,9 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 
-from datasets.schema import LATER_COLUMNS, TABLES
-from datasets.store.nulls import is_list_of_floats, with_nans
+from datasets.schema import FRAME_ID, LATER_COLUMNS, TABLES
+from datasets.store.nulls import is_list_of_floats, is_ragged_list_of_floats, with_nans
 from datasets.store.texts import longest
 
 MOST = 1e75  # of any number's size: fourth powers stay finite
@@ -36,11 +37,15 @@ def _faults(table: str, rows: pa.Table) -> Iterator[str]:
         if pa.types.is_floating(kind) or is_list_of_floats(kind):
             if np.any(np.abs(with_nans(column)) > MOST):
                 yield f"its {name} has a number beyond {MOST:g}"
+        elif is_ragged_list_of_floats(kind):
+            if not np.all(np.abs(with_nans(column.combine_chunks().flatten())) <= MOST):
+                yield f"its {name} has what is no number, or one beyond {MOST:g}"
         elif column.null_count and name in TABLES[table].names and name not in OPTIONAL:
             yield f"its {name} has a row without a value"
         elif pa.types.is_string(kind) and longest(column, "utf8_length") > MOST_LETTERS:
             yield f"its {name} has a text of more than {MOST_LETTERS} letters"
     yield from _faults_of_images(rows)
+    yield from _faults_of_factors(rows)
     if "status" in rows.column_names:
         yield from _faults_of_status(table, rows)
     if all(name in rows.column_names for name in QUATERNION):
@@ -54,6 +59,17 @@ def _faults_of_images(rows: pa.Table) -> Iterator[str]:
         data = rows["image"].combine_chunks().field("bytes")
         if data.null_count:
             yield "it has a row without a picture"
+
+
+def _faults_of_factors(rows: pa.Table) -> Iterator[str]:
+    """The factors of a frame's points are matrices of two rows, as wide as each other."""
+    if "joint_factor_px" not in rows.column_names or FRAME_ID not in rows.column_names:
+        return
+    lengths = with_nans(pc.list_value_length(rows["joint_factor_px"]))
+    there = np.isfinite(lengths)
+    lengths, frames = lengths[there], rows[FRAME_ID].to_numpy()[there]
+    if np.any(lengths % 2) or np.any(lengths == 0) or np.any((np.diff(lengths) != 0) & (np.diff(frames) == 0)):
+        yield "its joint_factor_px are not matrices of two rows, as wide as each other in a frame"
 
 
 def _faults_of_status(table: str, rows: pa.Table) -> Iterator[str]:

@@ -58,6 +58,13 @@ def cost(residual: Array) -> Array:
 
 def equations(view: Observations, R: Array, t: Array) -> Equations:
     """Cost, gradient and information matrix."""
+    residual, rows = residuals_and_slopes(view, R, t)
+    slope = np.einsum("kb,kib->ib", residual.reshape(*rows.shape[::2]), rows)
+    return Equations(cost(residual), slope, upper_normal(rows))
+
+
+def residuals_and_slopes(view: Observations, R: Array, t: Array) -> tuple[Array, Array]:
+    """Whitened residuals (n, 2, b) and their slopes (2 n, 6, b) by the pose."""
     arm = np.einsum("nj,ijb->nib", view.points_in_obj, R)
     n, _, b = arm.shape
     point = arm + t
@@ -67,9 +74,7 @@ def equations(view: Observations, R: Array, t: Array) -> Equations:
     jacobian = np.empty((n, 2, 6, b))
     _fill_slopes(view, jacobian[:, :, 3:], side, scale, forward, bend)
     fill_turn_slopes(jacobian, arm)
-    rows = jacobian.reshape(2 * n, 6, b)
-    slope = np.einsum("kb,kib->ib", residual.reshape(2 * n, b), rows)
-    return Equations(cost(residual), slope, upper_normal(rows))
+    return residual, jacobian.reshape(2 * n, 6, b)
 
 
 def fill_turn_slopes(jacobian: Array, arm: Array) -> None:

@@ -78,7 +78,12 @@ IgnoreDisk = Annotated[
     bool, typer.Option("--ignore-disk", help="Begin even where the disk looks too small for what is still to be made.")
 ]
 
-DetectorName = Annotated[str, typer.Option("--detector", help="edge-fit (ours), opencv-subpix or opencv-sb.")]
+DetectorName = Annotated[
+    str,
+    typer.Option(
+        "--detector", help="edge-fit (ours), board-fit (a smooth map through its corners), opencv-subpix or opencv-sb."
+    ),
+]
 DetectSeconds = Annotated[
     float,
     typer.Option(

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eposit.arrays import Array
+from pipelines.detection.board_fit import fit_board
 from pipelines.detection.board_map import grid
 from pipelines.detection.circle import find_circle, misfit_squares
 from pipelines.detection.consistency import Corners, check_placed, too_many_bad
@@ -24,19 +25,24 @@ from pipelines.detection.statuses import STATUS_TYPE, PointStatus
 from pipelines.detection.time_limit import Check, TimeLimit, TooLateError
 from pipelines.detection.tone_curve import decoded
 from render.targets.chessboard import Chessboard
+from render.targets.circle_grid import CircleGrid
 from render.targets.kinds import AnyTarget
 from render.targets.printed import PrintedBoard
 
 
 class Detector(StrEnum):
-    """How corners are placed once the board is found. The circle is fitted by us with each of them."""
+    """How corners are placed once the board is found. The raised circle is fitted by us with each of them."""
 
     EDGE_FIT = "edge-fit"  # ours: two blurred edges, least squares
+    BOARD_FIT = "board-fit"  # ours: those corners as points of one smooth map, with their joint covariance
     OPENCV_SUBPIX = "opencv-subpix"  # cv2.cornerSubPix with half window 5
     OPENCV_SB = "opencv-sb"  # cv2.findChessboardCornersSB, exhaustive and accurate; for chessboards
 
 
 __all__ = ["Detection", "Detector", "PointStatus", "detect_points", "takes_target"]
+
+
+OURS = Detector.EDGE_FIT, Detector.BOARD_FIT
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +55,8 @@ class Detection:
     finder: str  # finder that saw the board, empty if none
     blur_px: float  # median blur of the edges, NaN if none
     exponent: float = 1.0  # of the picture's tone curve, see `tone_curve`; 1 if light was found
+    joint_factor: Array | None = None  # (n, 2, k) px: the covariance of points i and j is f[i] @ f[j].T; NaN where the
+    # status is not ok. None where the points' errors are taken for independent
 
 
 def detect_points(
@@ -66,7 +74,7 @@ def detect_points(
     if detector not in list(Detector):
         raise ValueError(f"unknown detector {detector!r}; choose one of {', '.join(Detector)}")
     if not takes_target(detector, target):
-        raise ValueError(f"detector {str(detector)!r} finds chessboards only; choose another for {target.pattern!r}")
+        raise ValueError(f"detector {str(detector)!r} does not find the target {target.pattern!r}; choose another")
     check_time = TimeLimit(seconds).check
     grey = grey_picture(image)
     try:
@@ -79,6 +87,8 @@ def detect_points(
 
 def takes_target(detector: str, target: AnyTarget) -> bool:
     """Whether a detector can find a kind of target."""
+    if detector == Detector.BOARD_FIT:
+        return not isinstance(target, CircleGrid)
     return detector != Detector.OPENCV_SB or isinstance(target, Chessboard)
 
 
@@ -98,9 +108,11 @@ def _detect_printed(image: Grey, target: PrintedBoard, detector: str, check_time
         return _nothing(count, PointStatus.CORNERS_INCONSISTENT, seen.finder)
     status = np.where(good, PointStatus.OK, PointStatus.POINT_NOT_FOUND).astype(STATUS_TYPE)
     points = np.where(good[:, None], placed.points_px, np.nan)
-    return Detection(
-        points, np.where(good[:, None, None], placed.covariance_px2, np.nan), status, seen.finder, placed.blur_px
-    )
+    covariance = np.where(good[:, None, None], placed.covariance_px2, np.nan)
+    found = Detection(points, covariance, status, seen.finder, placed.blur_px)
+    if detector != Detector.BOARD_FIT:
+        return found
+    return _smoothed(found, placed, np.arange(count), target.pattern_points / target.unit_mm)
 
 
 def _detect_chessboard(image: Grey, target: Chessboard, detector: str, check_time: Check) -> Detection:
@@ -117,7 +129,8 @@ def _detect_chessboard(image: Grey, target: Chessboard, detector: str, check_tim
     if too_many_bad(corners.consistent[: len(seen.ids)]):
         return _nothing(count, PointStatus.CORNERS_INCONSISTENT, seen.finder)
     ids = np.append(seen.ids, _unseen(seen, target))[: len(corners.consistent)]
-    misfit = misfit_squares(corners, grid(target.inner)[ids])
+    at = grid(target.inner)[ids]
+    misfit = misfit_squares(corners, at)
     check_time()
     light = decoded(image, corners.exponent)
     circle = find_circle(light, corners, target, misfit)
@@ -130,7 +143,30 @@ def _detect_chessboard(image: Grey, target: Chessboard, detector: str, check_tim
     if circle is not None:
         points[-1], status[-1] = circle.centre_px, PointStatus.OK
         covariance[-1] = circle.covariance_px2
-    return Detection(points, covariance, status, seen.finder, corners.blur_px, corners.exponent)
+    found = Detection(points, covariance, status, seen.finder, corners.blur_px, corners.exponent)
+    return _smoothed(found, corners, ids, at) if detector == Detector.BOARD_FIT else found
+
+
+def _smoothed(found: Detection, corners: Corners, ids: NDArray[np.int64], at: Array) -> Detection:
+    """A detection whose corners are points of one smooth map; another point, as the circle, keeps an error of its own.
+
+    ids: (n,) places of the corners in the detection. at: (n, 2) squares.
+    """
+    is_ok = found.status == PointStatus.OK
+    if not np.any(corners.consistent):
+        return found
+    try:
+        fit = fit_board(corners, at)
+    except np.linalg.LinAlgError:  # covariances without an inverse
+        return _nothing(len(is_ok), PointStatus.CORNERS_INCONSISTENT, found.finder)
+    good = ids[corners.consistent]
+    alone = np.setdiff1d(np.flatnonzero(is_ok), good)
+    points, rank = found.points_px.copy(), fit.factor.shape[2]
+    factor = np.zeros((len(points), 2, rank + 2 * len(alone)))
+    points[good], factor[good, :, :rank], factor[~is_ok] = fit.points_px, fit.factor, np.nan
+    for i, point in enumerate(alone):
+        factor[point, :, rank + 2 * i : rank + 2 * i + 2] = np.linalg.cholesky(found.covariance_px2[point])
+    return replace(found, points_px=points, covariance_px2=factor @ factor.transpose(0, 2, 1), joint_factor=factor)
 
 
 def _corners(image: Grey, seen: SeenPoints, target: Chessboard, detector: str, check_time: Check) -> Corners:
@@ -141,9 +177,9 @@ def _corners(image: Grey, seen: SeenPoints, target: Chessboard, detector: str, c
     size = (image.shape[1], image.shape[0])
     every = chessboard_sites(target)
     sites = every.chosen(seen.ids)
-    unseen = every.chosen(_unseen(seen, target)) if detector == Detector.EDGE_FIT else None
+    unseen = every.chosen(_unseen(seen, target)) if detector in OURS else None
     fitted = refine_corners(image, first_map(seen, size, target), sites, unseen, check_time)
-    if detector == Detector.EDGE_FIT or not np.any(fitted.consistent):
+    if detector in OURS or not np.any(fitted.consistent):
         return fitted
     placed = subpix(image, seen.points_px) if detector == Detector.OPENCV_SUBPIX else seen.points_px
     return check_placed(placed, fitted, sites.at, size)

@@ -31,6 +31,7 @@ class Corners:
     noise: float = np.nan  # median variance of what the fits leave, grey values^2
     widths_beyond_px: tuple[float, float] = (np.nan, np.nan)  # of edges along x and y, see `widths_beyond`
     exponent: float = 1.0  # of the picture's tone curve, see `tone_curve`
+    scatter: float = 1.0  # factor, in the covariances, of what the corners' own pixels state, see `corner_scatter`
 
 
 def drop_inconsistent(corners: Corners, at: Array, size: tuple[int, int]) -> Corners:
@@ -45,7 +46,7 @@ def drop_inconsistent(corners: Corners, at: Array, size: tuple[int, int]) -> Cor
         return agreed
     parts = (at, agreed.points_px - agreed.board(at), agreed.covariance_px2, agreed.board.slopes(at))
     factor = scatter_of_neighbours(*(part[good] for part in parts))
-    return replace(agreed, covariance_px2=agreed.covariance_px2 * factor)
+    return replace(agreed, covariance_px2=agreed.covariance_px2 * factor, scatter=factor)
 
 
 def _agreeing(corners: Corners, at: Array, size: tuple[int, int]) -> Corners:

@@ -51,14 +51,14 @@ def scatter_about(slopes: Array, missed: Array, covariance: Array) -> float:
 
 def leverage(slopes: Array) -> Array:
     """(m,) diagonal of the hat matrix of (m, k) rows, of which some columns may say the same."""
-    return np.sum(_span(slopes) ** 2, axis=1)
+    return np.sum(orthonormal(slopes) ** 2, axis=1)
 
 
 def _squares(slopes: Array, missed: Array, covariance: Array) -> tuple[float, float]:
     """Sum of squares, over the covariances, of what no parameters explain, and its degrees of freedom."""
     whitener = np.linalg.cholesky(np.linalg.inv(covariance)).transpose(0, 2, 1)
     residuals = (whitener @ missed[..., None]).ravel()
-    span = _span((whitener @ slopes).reshape(len(residuals), -1))
+    span = orthonormal((whitener @ slopes).reshape(len(residuals), -1))
     left = residuals - span @ (span.T @ residuals)
     return float(left @ left), float(len(residuals) - span.shape[1])
 
@@ -74,7 +74,7 @@ def _polynomials(at: Array) -> Array:
     return np.einsum("nt,ck->nctk", terms, np.eye(2)).reshape(len(at), 2, -1)
 
 
-def _span(slopes: Array) -> Array:
+def orthonormal(slopes: Array) -> Array:
     """(m, r) orthonormal columns that span those of (m, k), of which some may say the same."""
     size = np.linalg.norm(slopes, axis=0)
     left, singular, _ = np.linalg.svd(slopes / np.where(size > 0.0, size, 1.0), full_matrices=False)

@@ -20,6 +20,7 @@ from datasets.plan import shard_count
 from datasets.rows import decode_image, table
 from datasets.schema import DETECTIONS
 from datasets.store.dataset import Dataset
+from eposit.arrays import Array
 from pipelines.detection import Detection, Detector, PointStatus, detect_points
 from pipelines.detection.prepare import compile_kernels
 from pipelines.detection.time_limit import DETECT_SECONDS
@@ -82,6 +83,7 @@ def run_shard(
             "status": found.status,
             "finder": np.full(n, found.finder),
             "blur_px": np.full(n, found.blur_px),
+            "joint_factor_px": _lists(found.joint_factor, n),
         }
         parts.append(table(DETECTIONS, columns))
         advance()
@@ -105,3 +107,10 @@ def _is_late(found: Detection) -> bool:
 def _load_kernels() -> None:
     """Once in a process, as loading or compiling them is no part of any picture's time."""
     compile_kernels()
+
+
+def _lists(factor: Array | None, n: int) -> list[Array | None]:
+    """Rows of (n, 2, k) as lists; None for those of NaN."""
+    if factor is None:
+        return [None] * n
+    return [row.ravel() if np.all(np.isfinite(row)) else None for row in factor]

@@ -6,14 +6,14 @@ import functools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
 
 from datasets.errors import UserError
 from datasets.plan import Stream, rng_for, shard_count
-from datasets.rows import camera_of, covariances_by_frame, estimate_rows, points_by_frame
+from datasets.rows import camera_of, covariances_by_frame, estimate_rows, joint_factors_by_frame, points_by_frame
 from datasets.schema import FRAMES
 from datasets.store.dataset import Dataset
 from eposit import Solution, Status
@@ -23,6 +23,7 @@ from pipelines.adapters.registry import find_solver, takes_theta_centre
 from pipelines.adapters.results import PoseResult, Solver, gather
 from pipelines.adapters.user import SIGMA, SOLVER_FORM, as_solver, is_given
 from pipelines.stages.detect import path_of
+from pipelines.stages.joint_pose import as_if_independent, jointly
 from pipelines.stages.settings import Setting, assumed
 
 REACHES_BOUND = "best"  # the solver that weighs its points, so that their covariances tell the pose's
@@ -48,10 +49,12 @@ def run_shard(dataset: Dataset, index: int, setting: Setting, limit_s: float = L
     rows = dataset.read_shard(path)
     points = points_by_frame(rows, target)
     sigmas = covariances_by_frame(rows, target) if detected else {}
+    factors = joint_factors_by_frame(rows, target) if detected else {}
     parts: list[pa.Table] = []
     for frame in frames:
         frame_id, before = frame["frame_id"], len(notes)
-        parts.append(_estimate(dataset, frame, points[frame_id], sigmas.get(frame_id), setting, solver))
+        seen = _FramePoints(points[frame_id], sigmas.get(frame_id), factors.get(frame_id))
+        parts.append(_estimate(dataset, frame, seen, setting, solver))
         notes[before:] = [f"frame {frame_id}: {note}" for note in notes[before:]]
     dataset.write_shard(path_of_shard(dataset, index, setting.name), pa.concat_tables(parts))
     return notes[0] if notes else None
@@ -76,6 +79,14 @@ def path_of_shard(dataset: Dataset, index: int, name: str) -> Path:
     return dataset.shard_path("estimates", index, shard_count(dataset.recipe), name)
 
 
+class _FramePoints(NamedTuple):
+    """Points of one frame and what is stated of them; NaN where one was not found."""
+
+    pixels: Array  # (n, 2)
+    sigma: Array | None  # (n, 2, 2) covariances of detected points, px^2
+    factor: Array | None  # (n, 2, k) px, of their joint covariance, see `joint_pose`
+
+
 @dataclass(frozen=True, slots=True)
 class _SolverInput:
     """What a solver is given of one frame."""
@@ -83,6 +94,7 @@ class _SolverInput:
     points_in_obj: Array  # (n, 3) mm
     points_px: Array  # (b, n, 2), one image for each draw; NaN where a point was not found
     sigma_px: Array | float | None  # as for `eposit.solve`; None for points without noise
+    factor: Array | None = None  # (n, 2, k) px, of points whose errors are shared
 
     @property
     def has_enough_points(self) -> bool:
@@ -93,27 +105,24 @@ class _SolverInput:
 def _estimate(
     dataset: Dataset,
     frame: dict[str, Any],
-    points_px: Array,
-    sigma: Array | None,
+    seen: _FramePoints,
     setting: Setting,
     solver: Solver,
 ) -> pa.Table:
-    """Rows of one frame, one for each draw. sigma: (n, 2, 2) covariances of detected points, px^2."""
-    given = _solver_input(dataset, frame, points_px, sigma, setting)
+    """Rows of one frame, one for each draw."""
+    given = _solver_input(dataset, frame, seen, setting)
     solution = _solved(given, frame, setting, solver)
     draws = range(len(given.points_px))
     key = (setting.solver, setting.points_name, setting.camera, setting.use)
     return estimate_rows([frame["frame_id"]] * len(draws), draws, key, solution, len(given.points_in_obj))
 
 
-def _solver_input(
-    dataset: Dataset, frame: dict[str, Any], points_px: Array, sigma: Array | None, setting: Setting
-) -> _SolverInput:
+def _solver_input(dataset: Dataset, frame: dict[str, Any], seen: _FramePoints, setting: Setting) -> _SolverInput:
     """The points that the setting chooses, with its noise. Of all points, those that were not found are left out."""
     points_in_obj, noisy, four = dataset.recipe.target.points, setting.points == "truth+noise", setting.use == "four"
-    images = [points_px]
+    images = [seen.pixels]
     if noisy:
-        images = [points_px + _noise(dataset, frame, draw, setting) for draw in range(setting.draws)]
+        images = [seen.pixels + _noise(dataset, frame, draw, setting) for draw in range(setting.draws)]
     chosen = np.array(dataset.recipe.four_indices()) if four else np.arange(len(points_in_obj))
     batch = np.stack(images)[:, chosen]
     if not four:
@@ -121,7 +130,8 @@ def _solver_input(
         chosen, batch = chosen[found], batch[:, found]
     if noisy:
         return _SolverInput(points_in_obj[chosen], batch, setting.noise_px)
-    return _SolverInput(points_in_obj[chosen], batch, None if sigma is None else sigma[chosen])
+    sigma, factor = (None if part is None else part[chosen] for part in (seen.sigma, seen.factor))
+    return _SolverInput(points_in_obj[chosen], batch, sigma, factor)
 
 
 def _is_found(batch: Array) -> Mask:
@@ -135,7 +145,11 @@ def _solved(given: _SolverInput, frame: dict[str, Any], setting: Setting, solver
     if not given.has_enough_points:
         answers = [PoseResult(Status.POINTS_MISSING)] * b
         return gather(given.points_in_obj, given.points_px, camera_of(frame), answers, single=False)
-    solution = solve_with(setting, given.points_in_obj, given.points_px, frame, given.sigma_px, solver)
+    joint = setting.solver == REACHES_BOUND and given.factor is not None
+    sigma = as_if_independent(given.factor) if joint else given.sigma_px
+    solution = solve_with(setting, given.points_in_obj, given.points_px, frame, sigma, solver)
+    if joint:
+        return jointly(solution, given.points_in_obj, given.points_px, assumed(frame, setting.camera), given.factor)
     if given.sigma_px is not None and (setting.solver == REACHES_BOUND or is_given(setting.solver)):
         return solution
     return replace(solution, covariance=np.full((b, 6, 6), np.nan))

@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from datasets.schema import ESTIMATES
+from datasets.schema import DETECTIONS, ESTIMATES
 from datasets.store.digest import combined_digest, table_digest
 from datasets.store.images import encode_png
 from datasets.store.nulls import with_nulls
@@ -49,6 +49,15 @@ def test_lists_are_as_canonical_as_numbers(of_list):
     table = pa.table({"x": pa.array(make(np.nan), kind)})
     assert with_nulls(table)["x"].null_count == 1
     assert table_digest(with_nulls(table)) == table_digest(table)
+
+
+def test_lists_of_any_length_count_by_their_lengths_and_values():
+    kind = DETECTIONS.field("joint_factor_px").type
+    lists = ([[1.0, 2.0], None, [3.0]], [[1.0], None, [2.0, 3.0]], [[1.0, 2.0], [], [3.0]], [[1.0, 2.0], None, [4.0]])
+    assert len({digest(values, kind) for values in lists}) == 4
+    assert digest([[0.0]], kind) == digest([[-0.0]], kind)
+    whole = pa.table({"x": pa.array(lists[0], kind)})
+    assert table_digest(pa.concat_tables([whole.slice(0, 1), whole.slice(1)])) == table_digest(whole)
 
 
 def test_the_type_counts():

@@ -34,7 +34,7 @@ def make(rng: random.Random, place: Place) -> tuple[str, list[Call]]:
     write(path, pa.Table.from_pylist(changed, rows.schema), footer)
     for name in ("detections", "estimates", "scores"):
         shutil.rmtree(root / name)
-    detector = rng.choice(("edge-fit", "opencv-subpix", "opencv-sb"))
+    detector = rng.choice(("edge-fit", "board-fit", "opencv-subpix", "opencv-sb"))
     calls: list[Call] = [("detect", root, "-q", "--detector", detector)]
     points = ("--detector", detector) if detector != "edge-fit" else ()
     calls += [("estimate", root, "-q", *points), ("score", root, "-q"), ("report", root), ("verify", root)]

@@ -18,7 +18,7 @@ CASES = {
     "unknown points": (estimate("--points", "seen"), "unknown points 'seen'; choose one of detected"),
     "unknown detector": (
         on_dataset("detect", "--detector", "edge-fitt"),
-        "unknown detector 'edge-fitt'; choose one of edge-fit, opencv-subpix, opencv-sb",
+        "unknown detector 'edge-fitt'; choose one of edge-fit, board-fit, opencv-subpix, opencv-sb",
     ),
     "empty detector": (on_dataset("detect", "--detector", ""), "unknown detector ''; choose one of edge-fit"),
     "detector in capitals": (on_dataset("detect", "--detector", "OPENCV-SB"), "unknown detector 'OPENCV-SB'"),

@@ -6,10 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipelines.detection.board_fit import fit_board
 from pipelines.detection.board_map import BoardMap, grid
+from pipelines.detection.corner_scatter import orthonormal
 from pipelines.detection.corner_sites import REACH, CornerSites
 from pipelines.detection.corners import refine_corners
 from pipelines.machine import versions
+from tests.pipelines.detection.sheets import FLAT, Sheet, fitted, rms
 from tests.supersampled import digitised, picture, side
 
 PLACE = Path(__file__).parents[3] / "docs" / "evidence" / "corner-bound.md"
@@ -19,9 +22,31 @@ ANGLE, BLUR, MEAN, CONTRAST, NOISE = np.deg2rad(17.0), 0.7, 110.0, 85.0, 2.0
 CELLS, DRAWS = 4, 8
 WINDOW_PX = 10  # that of a fit whose window does not follow the squares
 STEPS = np.array([0.05, 0.05, 1e-3, 1e-3, 0.02, 1.0, 1.0, 1e-4, 1e-4])
+SHEETS = {
+    "flat, perspective": ("perspective", FLAT),
+    "flat, stereographic": ("stereographic", FLAT),
+    "flat, equidistance": ("equidistance", FLAT),
+    "flat, equisolid": ("equisolid", FLAT),
+    "flat, orthogonal": ("orthogonal", FLAT),
+    "bent by 0.05 mm": ("equidistance", Sheet(sag=0.05)),
+    "bent by 0.3 mm": ("equidistance", Sheet(sag=0.3)),
+    "bent by 1 mm": ("equidistance", Sheet(sag=1.0)),
+    "bent by 3 mm": ("equidistance", Sheet(sag=3.0)),
+    "bent by 10 mm": ("equidistance", Sheet(sag=10.0)),
+    "bent by 10 mm, perspective": ("perspective", Sheet(sag=10.0)),
+    "twisted by 3 mm": ("orthogonal", Sheet(twist=3.0)),
+    "printed 1 % too wide": ("equidistance", Sheet(stretch=1.01)),
+    "each corner printed 0.1 mm elsewhere": ("equidistance", Sheet(displaced=0.1)),
+    "the same, bent by 3 mm": ("equidistance", Sheet(displaced=0.1, sag=3.0)),
+    "flat, 5 x 4 corners": ("equidistance", Sheet((5, 4))),
+    "flat, 3 x 3 corners": ("equidistance", Sheet((3, 3))),
+}
+SHEET_BOARDS = 40
 # 320 numbers tell a ratio to 0.04. The fit reads a band beside the edges, not all of a square, and stops half a
 # deviation from the least.
 MOST_RATIO = 1.25
+# 104 numbers tell it to 0.07; the corners are up to 1.18 over their bound, and not to know the sheet costs 1.05.
+MOST_FIT_RATIO = 1.45
 
 
 def lines(square_px):
@@ -72,7 +97,7 @@ def bound(square_px, within):
 
 
 def measured(square_px):
-    """RMS per axis, px, and in stated deviations."""
+    """RMS per axis, px, and in stated deviations, of corners and of their board fit; parameters of its map."""
     image, truth = board(square_px)
     at, size = grid(INNER), image.shape[::-1]
     sense = np.where(at.sum(axis=1) % 2 == 0, -1.0, 1.0)
@@ -82,16 +107,19 @@ def measured(square_px):
         first = BoardMap.fit(at, truth + rng.uniform(-0.3, 0.3, truth.shape), size, np.ones(len(at)), hold=1.0)
         found = refine_corners(digitised(image, rng, NOISE), first, CornerSites(at, sense))
         assert found.consistent.all()
-        errors.append(found.points_px - truth)
-        whitener = np.linalg.cholesky(np.linalg.inv(found.covariance_px2)).transpose(0, 2, 1)
+        fit = fit_board(found, at)
+        stated = np.stack((found.covariance_px2, fit.factor @ fit.factor.transpose(0, 2, 1)))
+        errors.append(np.stack((found.points_px, fit.points_px)) - truth)
+        whitener = np.swapaxes(np.linalg.cholesky(np.linalg.inv(stated)), -1, -2)
         normalised.append((whitener @ errors[-1][..., None])[..., 0])
-    return (np.sqrt(np.mean(np.square(values))) for values in (errors, normalised))
+    rank = orthonormal(found.board.slopes(at).reshape(2 * len(at), -1)).shape[1]
+    return *(np.sqrt(np.mean(np.square(values), axis=(0, 2, 3))) for values in (errors, normalised)), rank
 
 
 @pytest.mark.slow  # pictures of 1400 px with 16 cells to a pixel
 def test_corners_stand_near_the_bound_of_their_pixels():
     """Writes docs/evidence/corner-bound.md."""
-    rows, ratios = [], []
+    rows, fits, ratios = [], [], []
     back = np.linalg.inv(lines(1.0))
     for square_px in SIDES:
         whole = bound(
@@ -99,15 +127,26 @@ def test_corners_stand_near_the_bound_of_their_pixels():
             lambda x, y, s=square_px: np.all(np.abs(np.tensordot(back, np.stack((x, y)), 1)) < REACH * s, axis=0),
         )
         small = bound(square_px, lambda x, y: np.hypot(x, y) < WINDOW_PX)
-        rms, normalised = measured(square_px)
-        ratios.append(rms / whole)
-        rows.append(f"| {square_px} | {whole:.5f} | {small:.5f} | {rms:.5f} | {rms / whole:.2f} | {normalised:.2f} |")
-        print(rows[-1], flush=True)
-    PLACE.write_text(page(rows))
-    assert max(ratios) < MOST_RATIO
+        (found, fit), (normalised, of_fit), rank = measured(square_px)
+        of_map = whole * np.sqrt(rank / (2.0 * INNER[0] * INNER[1]))
+        ratios.append((found / whole, fit / of_map))
+        rows.append(
+            f"| {square_px} | {whole:.5f} | {small:.5f} | {found:.5f} | {ratios[-1][0]:.2f} | {normalised:.2f} |"
+        )
+        fits.append(f"| {square_px} | {of_map:.5f} | {found:.5f} | {fit:.5f} | {ratios[-1][1]:.2f} | {of_fit:.2f} |")
+        print(rows[-1], fits[-1], flush=True)
+    sheets = [sheet_row(name, fitted(*SHEETS[name], boards=SHEET_BOARDS)) for name in SHEETS]
+    PLACE.write_text(page(rows, fits, sheets))
+    assert max(ratio for ratio, _ in ratios) < MOST_RATIO
+    assert max(ratio for _, ratio in ratios) < MOST_FIT_RATIO
 
 
-def page(rows):
+def sheet_row(name, found):
+    """Of the table of board fits on drawn corners."""
+    return f"| {name} | {rms(found.alone):.4f} | {rms(found.errors):.4f} | {found.normalised():.2f} |"
+
+
+def page(rows, fits, sheets):
     """The page of evidence."""
     return f"""# Corners over the bound of their pixels
 
@@ -123,4 +162,23 @@ along both axes, so that neighbours share hardly any. All are px per axis.
 | square px | bound | bound of a window of {WINDOW_PX} px | found, RMS | over the bound | in stated deviations |
 |---|---|---|---|---|---|
 {chr(10).join(rows)}
+
+## All corners of a board in one fit
+
+The same pictures with `--detector board-fit`: the corners as points of one smooth map. Its bound is the corners', where
+pose and lens of the map, whatever they are, are all that is unknown. The fit does not know that: what a bent sheet or a
+misprint would add is estimated, too.
+
+| square px | bound of the map | corners, RMS | board fit, RMS | over the bound | in stated deviations |
+|---|---|---|---|---|---|
+{chr(10).join(fits)}
+
+What the map could absorb, on corners drawn with the errors that are stated for them, 0.002 px each: {SHEET_BOARDS}
+boards of 9 x 6 corners and squares of 100 mm, 1.2 to 2.5 m before a camera of 1600 x 1200 px and f = 552 px, up to
+40 degrees from its axis, tilted by up to 35 about each. Errors are from the board as designed: print that displaces
+each corner is an error, a bend and a scale of the whole print are not.
+
+| board | corners, RMS px | board fit, RMS px | in stated deviations |
+|---|---|---|---|
+{chr(10).join(sheets)}
 """

@@ -122,6 +122,25 @@ def test_covariances_follow_the_corners(detected, errors):
     assert worst > 1.15 * best
 
 
+def test_a_board_fit_has_a_third_of_the_errors_and_says_so(demo, errors):
+    chosen = range(0, len(demo), 2)
+    found = [detect_points(demo[i][1], TARGET, Detector.BOARD_FIT) for i in chosen]
+    assert {status for one in found for status in one.status} == {"ok"}
+    error = np.array([one.points_px - demo[i][2] for i, one in zip(chosen, found, strict=True)])
+    # Fifteen to twenty parameters and 108 coordinates: sqrt(17 / 108) = 0.4. Measured 0.35.
+    assert rms(error[:, :CIRCLE].ravel()) < 0.45 * rms(errors[chosen, :CIRCLE].ravel())
+    np.testing.assert_array_equal(error[:, CIRCLE], errors[chosen, CIRCLE])
+    stated = np.array([one.covariance_px2 for one in found])
+    whitened = (np.swapaxes(np.linalg.cholesky(np.linalg.inv(stated)), -1, -2) @ error[..., None])[..., 0]
+    # Twenty boards of fifteen numbers tell it to 0.04; each board's own scatter, by which it is scaled, to 0.07.
+    assert 0.8 < rms(whitened[:, :CIRCLE].ravel()) < 1.2
+    for one in found:
+        blocks = one.joint_factor @ one.joint_factor.transpose(0, 2, 1)
+        np.testing.assert_array_equal(blocks, one.covariance_px2)
+        # The circle has an error of its own.
+        assert not np.any(np.einsum("ak,nbk->nab", one.joint_factor[CIRCLE], one.joint_factor[:CIRCLE]))
+
+
 @pytest.mark.parametrize("turn", ["half", "quarter", "three quarters"])
 @pytest.mark.parametrize("index", [0, 4, 22, 39])
 def test_a_turned_picture_gives_the_same_points(demo, detected, turn, index):
@@ -203,7 +222,9 @@ def test_a_hidden_circle_leaves_the_corners(demo):
 
 
 def test_an_unknown_detector_is_named_with_the_known_ones(demo):
-    with pytest.raises(ValueError, match=r"unknown detector 'ours'; choose one of edge-fit, opencv-subpix, opencv-sb"):
+    with pytest.raises(
+        ValueError, match=r"unknown detector 'ours'; choose one of edge-fit, board-fit, opencv-subpix, opencv-sb"
+    ):
         detect_points(demo[0][1], TARGET, "ours")
 
 
@@ -211,7 +232,7 @@ def test_detectors_lie_side_by_side_in_one_dataset(tiny, tmp_path, cli, content)
     root = tmp_path / "dataset"
     shutil.copytree(tiny[1], root)
     before = {path: path.read_bytes() for path in root.rglob("*.parquet")}
-    for detector in (Detector.OPENCV_SUBPIX, Detector.OPENCV_SB):
+    for detector in (Detector.BOARD_FIT, Detector.OPENCV_SUBPIX, Detector.OPENCV_SB):
         assert cli("detect", root, "--detector", detector).code == 0
     assert cli("estimate", root, "--detector", Detector.OPENCV_SUBPIX).code == 0
     assert cli("score", root).code == 0
@@ -223,7 +244,8 @@ def test_detectors_lie_side_by_side_in_one_dataset(tiny, tmp_path, cli, content)
     n = 2 * len(TARGET.points)
     assert {name: pc.sum(pc.equal(rows["detector"], name)).as_py() for name in Detector} == dict.fromkeys(Detector, n)
     names = {path.name for path in (root / "detections").glob("*-00000-of-*")}
-    assert names == {f"{name}-00000-of-00002.parquet" for name in ("detections", "opencv-subpix", "opencv-sb")}
+    variants = ("detections", "board-fit", "opencv-subpix", "opencv-sb")
+    assert names == {f"{name}-00000-of-00002.parquet" for name in variants}
     ours, theirs = (
         np.array(rows.filter(pc.equal(rows["detector"], name))["x_px"])
         for name in (Detector.EDGE_FIT, Detector.OPENCV_SUBPIX)

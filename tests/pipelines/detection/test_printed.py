@@ -137,7 +137,7 @@ def test_nothing_is_found_where_nothing_is():
 
 def test_the_sector_based_finder_takes_no_markers():
     assert not takes_target(Detector.OPENCV_SB, Charuco())
-    with pytest.raises(ValueError, match="'opencv-sb' finds chessboards only; choose another for 'charuco'"):
+    with pytest.raises(ValueError, match="'opencv-sb' does not find the target 'charuco'; choose another"):
         detect_points(np.zeros((100, 100), np.uint8), Charuco(), Detector.OPENCV_SB)
 
 
