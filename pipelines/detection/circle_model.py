@@ -23,10 +23,9 @@ from pipelines.detection.erf import GAUSS, decay, signed_share
 from pipelines.detection.kernels import compiled
 
 Places = NDArray[np.intp]
-# Numbers of a fit, in order: disc x, y, in radii from where it is expected, its size as a ratio, and by how much it is
-# longer along x than along y and along one diagonal than along the other, as shares; shadow x, y from the foot and the
-# softness of its rim, in radii; then k, w, gx, gy, hx, hy (per radius), A, L in grey values; then L of m further
-# shadows.
+# Numbers of a fit: disc x, y, in radii from where it is expected, its size as a ratio, and by how much it is longer
+# along x than along y and along one diagonal than along the other, as shares; shadow x, y from the foot and the
+# softness of its rim, in radii; then k, w, gx, gy, hx, hy (per radius), A, L in grey values; then L of m more shadows.
 SHAPE, LINEAR = 8, 8
 SIZE, OBLONG, SHADOW, SOFTNESS = 2, slice(3, 5), slice(5, 7), 7
 DISC_GREY, WHITE_GREY, WHITE_SLOPE, DISC_SLOPE, BLOCKED, LAMP, FURTHER = 8, 9, slice(10, 12), slice(12, 14), 14, 15, 16
@@ -167,8 +166,7 @@ def _blurred(fine: Array, kernel: Array, finer: int, rows: Places, columns: Plac
 def fit_disc(patch: Patch, prior: Prior) -> DiscFit:
     """Fit one disc by Levenberg and Marquardt; the linear numbers are the best ones at each shape.
 
-    The loop is NumPy's, and what takes time is compiled, one function a task: a picture has one circle, and Numba
-    would need seconds for the loop.
+    The loop is NumPy's, what takes time is compiled: a picture has one circle, and Numba needs seconds for a loop.
     """
     values, trial = np.zeros_like(prior.mean), np.zeros_like(prior.mean)
     trial[:SHAPE] = prior.start
@@ -280,9 +278,7 @@ def _unexplained(patch: Patch, jacobian: Array, residual: Array, covariance: Arr
 def _rim_doubt(patch: Patch, values: Array, solved: Array) -> Array:
     """(16 + m,) by how much the fit would move if the shadow's rim were a straight ramp as wide as the bell's integral.
 
-    How the rim of a shadow goes from dark to light depends on the lamp's form, which is not known: of a disc, of a
-    window, of a row of lamps. A bell and a box lie on both sides of most.
-
+    A rim's form is that of the lamp, which is not known; a bell and a box lie on both sides of most.
     solved: (16 + m, n) change of the numbers for a change of the pixels.
     """
     opened, _ = _open_share(patch.on_disc, values, patch.per_px, patch.finer)
