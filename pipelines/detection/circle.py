@@ -62,6 +62,7 @@ LOOK_SPREADS = 10.0  # half its axes, in deviations of the prediction: it is far
 GOOD_SHARE = 1.2  # of the residuals of the best fit in the ellipse, up to which a fit from the prediction is kept
 FAR_SPREADS = 3.0  # of the prediction that a circle may lie off, for each that a linear map allows
 OFF_SHARE = 0.02  # of how far it lies off: a map that is wrong there has the circle's form a little wrong, too
+MISFIT_SHARE = 0.1  # of the map's misfit, by which a bent sheet moves it
 CORNERS_SHARE = 0.25  # of the corners' stated error that a circle has at least: what moves them moves it
 USUALLY_BEYOND_PX = 0.1  # by which edges differ from those of a gaussian blur in ordinary pictures, defocus included
 BEYOND_SHARE, APART_SHARE = 0.09, 0.3  # of what they differ by more, and along one axis more than along the other, by
@@ -155,7 +156,9 @@ class _Place:
         along_x, along_y = np.nan_to_num(self.corners.widths_beyond_px)
         beyond = max(abs(along_x), abs(along_y), USUALLY_BEYOND_PX) - USUALLY_BEYOND_PX
         apart = max(abs(along_x - along_y), USUALLY_BEYOND_PX) - USUALLY_BEYOND_PX
+        misfit = self.misfit * math.sqrt(abs(np.linalg.det(self.seen[1]))) / self.radius
         variance = OFF_SHARE**2 * (off @ off) + (BEYOND_SHARE * beyond) ** 2 + (APART_SHARE * apart) ** 2
+        variance += (MISFIT_SHARE * misfit) ** 2
         return variance * np.eye(2) + CORNERS_SHARE**2 * corners
 
     def _best_fit(self) -> DiscFit | None:
