@@ -41,13 +41,14 @@ from pipelines.detection.circle_model import (
 )
 from pipelines.detection.circle_patch import Picture, circle_patch
 from pipelines.detection.consistency import Corners
+from pipelines.detection.corner_blur import SAMPLING
 from render.targets.chessboard import Chessboard
 
 WHITE_PERCENT = 95.0  # of the patch's pixels that are no brighter than its white, but for noise
 SHARPENED, SHARPENED_TO = (1.0, 2.6, 0.25), 0.01  # times as blurred as they look, from, to, by; how well it is found
 START_SHADOW = (0.18, 0.18, 0.18)  # place and softness, in heights of the circle above the board
 SIZE_SPREAD = 0.003  # the board's map gives the size to this: nearer or farther it looks the same to five in a thousand
-FORM_SPREAD, MISFIT_SLOPES = 0.0001, 6.0  # likewise its form; and misfits of the map, squares, that its slopes are off
+FORM_SPREAD, MISFIT_SLOPES = 0.003, 6.0  # print longer one way; misfits of the map, squares, that its slopes are off
 SHADOW_SPREAD, SOFTNESS_MEAN, SOFTNESS_SPREAD = 0.9, 0.15, 0.15  # heights
 FURTHEST_SHADOW = 3.6  # heights
 LEAST_CONTRAST = 0.35  # of the board's: what a circle's edge must have
@@ -65,6 +66,7 @@ OFF_SHARE = 0.02  # of how far it lies off: a map that is wrong there has the ci
 MISFIT_SHARE = 0.1  # of the map's misfit, by which a bent sheet moves it
 CORNERS_SHARE = 0.25  # of the corners' stated error that a circle has at least: what moves them moves it
 USUALLY_BEYOND_PX = 0.1  # by which edges differ from those of a gaussian blur in ordinary pictures, defocus included
+PRINT_BEYOND_PX = 0.025  # from which on it is print that runs
 BEYOND_SHARE, APART_SHARE = 0.09, 0.3  # of what they differ by more, and along one axis more than along the other, by
 # which a circle may be off: its shade looks like what sharpening and motion leave beside an edge
 USUALLY_LEFT, MOST_LEFT = 1.5, 30.0  # times the corners' noise that a fit leaves: no model of a disc explains more
@@ -163,7 +165,7 @@ class _Place:
 
     def _best_fit(self) -> DiscFit | None:
         """Of the circle where the board puts it and, if the place is unsure, of one that is looked for around it."""
-        blur_px, doubt = self.corners.blur_px, _looked_for(self.unsure)
+        blur_px, doubt = _edge_blur(self.corners), _looked_for(self.unsure)
         patch = self._patch(blur_px)
         if patch is not None and patch.clipped > MUCH_CLIPPED:
             blur_px *= self._sharpened(blur_px)
@@ -201,6 +203,15 @@ class _Place:
         best = int(np.argmin([left(share) for share in looks]))
         between = looks[max(best - 1, 0)], looks[min(best + 1, len(looks) - 1)]
         return float(minimize_scalar(left, bounds=between, method="bounded", options={"xatol": SHARPENED_TO}).x)
+
+
+def _edge_blur(corners: Corners) -> float:
+    """Px. Where black squares grew in print and meet at the corners, these look more blurred than the edges are."""
+    beyond = float(np.mean(corners.widths_beyond_px))
+    if not -USUALLY_BEYOND_PX < beyond < -PRINT_BEYOND_PX:
+        return corners.blur_px
+    width = math.sqrt(corners.blur_px**2 + SAMPLING) + beyond
+    return math.sqrt(max(width**2 - SAMPLING, LEAST_BLUR_PX**2))
 
 
 def misfit_squares(corners: Corners, at: Array) -> float:

@@ -18,6 +18,7 @@ from render.targets.disc_shade import blocked_share
 FINE, COARSE = 3, 2  # cells to a pixel along each side: for small patches, for large ones
 LARGE_PX = 45  # side of a patch from which the blur is well sampled by the coarse grid
 CLEAR_BLURS = 3.0  # blurs between a pixel and the next black square
+INK = 0.02  # squares, by which black ones may be wider in print
 BAND_PX = 1.5  # pixels of the board around the circle, beyond that
 LEAST_PIXELS = 40
 CLIPPED = 0.5, 254.5  # grey values: a pixel that is as dark or as bright may have had less light, or more
@@ -58,7 +59,7 @@ def circle_patch(
     blocked = blocked_share(np.hypot(*on_board), 1.0, height / radius)
     shape = (high[1] - low[1], finer, high[0] - low[0], finer)
     squares = (planes[0].reshape(2, *shape)).mean(axis=(2, 4))
-    margin = CLEAR_BLURS * blur_px * radius * np.linalg.norm(from_px, axis=1)
+    margin = INK + CLEAR_BLURS * blur_px * radius * np.linalg.norm(from_px, axis=1)
     white = np.empty(squares[0].shape, bool)
     _on_white(squares[0], squares[1], margin, target.columns, target.rows, target.margin_squares, white)
     part = image[low[1] : high[1], low[0] : high[0]].astype(np.float64)

@@ -4,7 +4,8 @@ A lens spreads light; the curve comes after it. One that lifts the dark part, as
 white squares grow over black ones, by up to half a blur. A corner stays where it is, as its two white squares lie
 opposite; but the raised circle shrinks, and more on the side that lies in the light than on that in its shade.
 
-Print that runs makes black squares grow; that, and clipped white, is left alone.
+Print that runs makes black squares grow; that, and clipped white, is left alone. So is print that is too thin: it moves
+edges and leaves them as they are, while a tone curve makes them lean.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ EXPONENTS = np.linspace(1.0, 3.2, 12)  # of the curve grey = light^(1 / exponent
 SURE = 4.0  # standard errors that the exponent must differ from 1
 LEAST_EXPONENT = 1.1  # below it a correction is smaller than what else moves edges
 LEAST_PROFILES = 8
+SURELY_PX = 0.005  # by which edges must lean more after a correction than before, where it was none
 
 
 def decoded(image: Grey, exponent: float) -> Light:
@@ -45,7 +47,10 @@ def measured_exponent(image: Grey, board: BoardMap, sites: CornerSites) -> float
         after = _growth(decoded(image, high), board, sites)[0]
         if after >= 0.0:
             exponent = low + before / (before - after) * (high - low)
-            return exponent if exponent >= LEAST_EXPONENT else 1.0
+            if exponent < LEAST_EXPONENT:
+                return 1.0
+            leaner = _lean(image, exponent, board, sites) > _lean(image, 1.0, board, sites) + SURELY_PX
+            return 1.0 if leaner else exponent
         before = after
     return 1.0
 
@@ -64,3 +69,17 @@ def _growth(light: Light, board: BoardMap, sites: CornerSites) -> tuple[float, f
     middle = float(np.median(beyond))
     spread = NORMAL_MAD * float(np.median(np.abs(beyond - middle)))
     return middle, spread * float(np.sqrt(0.5 * np.pi / len(beyond)))
+
+
+def _lean(image: Grey, exponent: float, board: BoardMap, sites: CornerSites) -> float:
+    """By how many px the middle of an edge's grey values lies beside that of its light, the median over edges."""
+    profiles = edge_profiles(decoded(image, exponent), board, sites)
+    if profiles is None:
+        return 0.0
+    shares, rows = profiles.shares, np.arange(len(profiles.shares))
+    after = np.clip(np.argmax(shares >= 0.5, axis=1), 1, shares.shape[1] - 1)
+    low, high = shares[rows, after - 1], shares[rows, after]
+    halfway = after - (high - 0.5) / np.maximum(high - low, 1e-9)
+    mean = shares.shape[1] - 0.5 - np.sum(shares, axis=1)
+    lean = profiles.step_px * np.where(profiles.rises, mean - halfway, halfway - mean)
+    return abs(float(np.median(lean)))

@@ -21,9 +21,8 @@ def test_rough_corners_beside_the_circle_take_no_part_in_the_first_map(monkeypat
     def detected(shift_px):
         corners = found.points_px.copy()
         corners[BESIDE_CIRCLE] += shift_px
-        monkeypatch.setattr(
-            "pipelines.detection.find_board", lambda image, target: SeenPoints(found.ids, corners, found.finder)
-        )
+        rough = SeenPoints(found.ids, corners, found.finder)
+        monkeypatch.setattr("pipelines.detection.find_board", lambda *given: rough)
         return detect_points(image, TARGET)
 
     expected, shifted = detected(0.0), detected([3.0, -2.0])
