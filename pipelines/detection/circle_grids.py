@@ -72,8 +72,9 @@ def _outline_centres(image: Grey, points: Array) -> Array:
             continue
         middle = 0.5 * (float(window[row, column]) + float(np.quantile(window, WHITE_QUANTILE)))
         _, labels, _, centroids = cv2.connectedComponentsWithStats(np.asarray(window < middle, np.uint8))
-        if labels[row, column]:
-            moved[k] = centroids[labels[row, column]] + (left, top)
+        piece = int(labels[row, column])
+        if piece:
+            moved[k] = centroids[piece] + (left, top)
     return moved
 
 

@@ -7,7 +7,7 @@ picture is looked at for: the others show in the picture reduced.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -41,7 +41,7 @@ class Blobs(NamedTuple):
 
     points: Array  # (n, 2) px
     sizes: Array  # (n,) diameters of discs of their areas, px
-    count: int  # of those that a grid is looked for among: the first
+    searched: int  # number of those that a grid is looked for among: the first
 
     def inside(self, discs: Array) -> int:
         """Number of the blobs of discs' size within the outlines of discs (k, 2) px."""
@@ -73,7 +73,7 @@ def _find_blobs(image: Grey, scale: int) -> Blobs:
     if scale > 1:
         level = np.asarray(cv2.resize(level, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
     level = cv2.GaussianBlur(level, (0, 0), SMOOTHING_PX)
-    depth = cv2.subtract(cv2.boxFilter(level, -1, (AROUND_PX, AROUND_PX)), level)
+    depth = np.asarray(cv2.subtract(cv2.boxFilter(level, -1, (AROUND_PX, AROUND_PX)), level), np.uint8)
     mask = cv2.compare(depth, _least_depth(depth), cv2.CMP_GT)
     count, _, stats, centroids = cv2.connectedComponentsWithStats(mask, connectivity=4, ltype=cv2.CV_32S)
     if count < 2:
@@ -92,11 +92,11 @@ def _least_depth(depth: Grey) -> Grey:
     middles = slice(BLOCK_PX // 2, None, BLOCK_PX)
     blocks = cv2.dilate(depth, np.ones((BLOCK_PX, BLOCK_PX), np.uint8))[middles, middles]
     most = cv2.dilate(np.ascontiguousarray(blocks), np.ones((BLOCKS, BLOCKS), np.uint8))
-    least = cv2.max(cv2.multiply(most, LEAST_SHARE), LEAST_DEPTH - 1.0)
+    least = np.maximum(np.rint(LEAST_SHARE * np.asarray(most, np.float32)), LEAST_DEPTH - 1.0).astype(np.uint8)
     return np.asarray(cv2.resize(least, depth.shape[::-1], interpolation=cv2.INTER_LINEAR), np.uint8)
 
 
-def _look_like_discs(stats: NDArray[np.int32]) -> NDArray[np.bool_]:
+def _look_like_discs(stats: NDArray[Any]) -> NDArray[np.bool_]:
     """(n,) which pieces have the area and the outlines of a disc that is seen from some side."""
     width, height, area = (
         stats[:, k].astype(np.float64) for k in (cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT, cv2.CC_STAT_AREA)
@@ -111,7 +111,7 @@ def groups_of_blobs(blobs: Blobs, distance: float, least: int) -> list[Array]:
 
     distance: of a grid's neighbouring discs, in diameters.
     """
-    n, points, sizes = blobs.count, blobs.points[: blobs.count], blobs.sizes[: blobs.count]
+    n, points, sizes = blobs.searched, blobs.points[: blobs.searched], blobs.sizes[: blobs.searched]
     if n < max(least, NEIGHBOURS + 1):
         return [points] if least <= n else []
     far, other = (np.asarray(part)[:, 1:] for part in cKDTree(points).query(points, k=NEIGHBOURS + 1))

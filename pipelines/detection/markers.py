@@ -114,8 +114,8 @@ def read_in_tiles(image: Grey, dictionary: cv2.aruco.Dictionary, border: int) ->
             detector = cv2.aruco.ArucoDetector(dictionary, parameters)
             corners, numbers, _ = detector.detectMarkers(np.ascontiguousarray(tile))
             if numbers is not None:
-                for number, at in zip(numbers.ravel().tolist(), corners, strict=True):
-                    found.setdefault(number, np.asarray(at + np.float32([left, top]), np.float32))
+                for number, at in zip(numbers.ravel(), corners, strict=True):
+                    found.setdefault(int(number), np.asarray(at + np.array([left, top]), np.float32))
     return list(found.values()), np.array(list(found), np.int32).reshape(-1, 1)
 
 

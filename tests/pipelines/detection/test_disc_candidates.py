@@ -47,7 +47,7 @@ def test_of_too_many_blobs_the_darkest_are_kept(monkeypatch):
     for x, y in centres:
         cv2.circle(noise, (x, y), 6, 10, -1)
     blobs = list(levels_of_blobs(noise))[-1]
-    assert blobs.count == 12 < len(blobs.points)
+    assert blobs.searched == 12 < len(blobs.points)
     assert {tuple(np.rint(point).astype(int)) for point in blobs.points[:12]} == set(centres)
 
 
