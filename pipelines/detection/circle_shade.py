@@ -48,12 +48,15 @@ def without_shade(light: Light, board: BoardMap, target: Chessboard, blur_px: fl
 
 def _places(x: Array, y: Array, board: BoardMap) -> Array:
     """(2, h, w) squares that the pixels of columns x (w,) and rows y (h,) see, interpolated from a coarse grid."""
-    nodes = [np.linspace(line[0], line[-1], NODES) for line in (x, y)]
-    shares = [
-        np.stack([np.interp(line, node, one) for one in np.eye(NODES)])
-        for line, node in zip((x, y), nodes, strict=True)
-    ]
-    return shares[1].T @ board.meet_planes(*nodes, np.zeros(1))[0] @ shares[0]
+    across, to_x = _hats(x)
+    down, to_y = _hats(y)
+    return to_y.T @ board.meet_planes(across, down, np.zeros(1))[0] @ to_x
+
+
+def _hats(line: Array) -> tuple[Array, Array]:
+    """(NODES,) numbers along a line (m,), and (NODES, m) shares of them in it that interpolate linearly."""
+    nodes = np.linspace(line[0], line[-1], NODES)
+    return nodes, np.stack([np.interp(line, nodes, one) for one in np.eye(NODES)])
 
 
 def _on_white(places: Array, x: Array, y: Array, board: BoardMap, target: Chessboard, blur_px: float) -> Mask:
