@@ -138,7 +138,8 @@ def joint_factors_by_frame(rows: pa.Table, target: Target) -> dict[int, Array]:
     count, lists = len(target.points), rows["joint_factor_px"].combine_chunks()
     if lists.null_count == len(lists):
         return {}
-    frame, found = rows["frame_id"].to_numpy(), {}
+    frame = rows["frame_id"].to_numpy()
+    found: dict[int, Array] = {}
     for start in range(0, len(lists), count):
         part = lists.slice(start, count)
         there = part.is_valid().to_numpy(zero_copy_only=False)

@@ -85,7 +85,9 @@ def _smoothed(at: Array, missed: Array, lower: Array, slopes: Array) -> tuple[Ar
 
 def _averaged(spectra: list[_Spectrum]) -> tuple[Array, Array]:
     """(m,) mean of the polynomials over strengths and decays, and (m, k) a factor of its covariance, both whitened."""
-    likelihoods, means, variances = [], [], []
+    likelihoods: list[Array] = []
+    means: list[Array] = []
+    variances: list[Array] = []
     for directions, sizes, seen in spectra:
         prior = (STRENGTHS[:, None] * sizes) ** 2
         share = prior / (1.0 + prior)  # of what is seen that belongs to the polynomials, and their variance after it

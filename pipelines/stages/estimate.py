@@ -145,11 +145,11 @@ def _solved(given: _SolverInput, frame: dict[str, Any], setting: Setting, solver
     if not given.has_enough_points:
         answers = [PoseResult(Status.POINTS_MISSING)] * b
         return gather(given.points_in_obj, given.points_px, camera_of(frame), answers, single=False)
-    joint = setting.solver == REACHES_BOUND and given.factor is not None
-    sigma = as_if_independent(given.factor) if joint else given.sigma_px
+    factor = given.factor if setting.solver == REACHES_BOUND else None
+    sigma = given.sigma_px if factor is None else as_if_independent(factor)
     solution = solve_with(setting, given.points_in_obj, given.points_px, frame, sigma, solver)
-    if joint:
-        return jointly(solution, given.points_in_obj, given.points_px, assumed(frame, setting.camera), given.factor)
+    if factor is not None:
+        return jointly(solution, given.points_in_obj, given.points_px, assumed(frame, setting.camera), factor)
     if given.sigma_px is not None and (setting.solver == REACHES_BOUND or is_given(setting.solver)):
         return solution
     return replace(solution, covariance=np.full((b, 6, 6), np.nan))

@@ -41,6 +41,8 @@ class Fitted(NamedTuple):
     alone: list  # (n, 2) errors of corners from their own pixels, px
     errors: list  # (n, 2) errors of the fit, px
     factors: list  # (n, 2, k) stated of it, px
+    poses: list  # cam_from_obj
+    camera: eposit.Camera
 
     def gain(self):
         """RMS over that of corners alone."""
@@ -65,7 +67,7 @@ FLAT = Sheet()
 def fitted(lens="equidistance", sheet=FLAT, seed=0, boards=8):
     """Boards anywhere up to 40 degrees from the axis; corners with uneven, tilted ellipses of errors."""
     camera = eposit.Camera(lens=lens, fx=552.39, fy=552.69, cx=782.41, cy=613.71, width=SIZE[0], height=SIZE[1])
-    rng, at, found = np.random.default_rng(seed), grid(sheet.inner), Fitted([], [], [])
+    rng, at, found = np.random.default_rng(seed), grid(sheet.inner), Fitted([], [], [], [], camera)
     while len(found.errors) < boards:
         R = Rotation.from_euler("xyz", rng.uniform(-35.0, 35.0, 3), degrees=True).as_matrix()
         away, around = np.deg2rad(rng.uniform(0.0, 40.0)), rng.uniform(0.0, 2.0 * np.pi)
@@ -80,6 +82,7 @@ def fitted(lens="equidistance", sheet=FLAT, seed=0, boards=8):
         found.alone.append(pixels - designed)
         found.errors.append(fit.points_px - designed)
         found.factors.append(fit.factor)
+        found.poses.append(eposit.Pose(R, t))
     return found
 
 
