@@ -31,16 +31,20 @@ and of circles {NORMALISED[0]} to {NORMALISED[1]} (20 circles tell it to 11 %), 
 REASONS = {
     "rolling-shake": "rows are moved by a wave two squares long, so that neighbours are moved against each other as by "
     "errors of their own; nothing in one picture tells that from noise, and the stated error is too large",
-    "shadow-edge": "a corner is refused whose pixels a hard shadow crosses: they look like those of a corner that is "
-    "covered in part",
+    "shadow-edge": "where the shadow's edge crosses the circle, nothing tells which way the board lies; a few corners lie "
+    "on the edge itself",
     "hot-pixels": "a black pixel upon an edge lies within the grey values of its neighbours and is not taken out; the "
     "corner is refused",
     "salt-pepper": "as `hot-pixels`",
     "small": "beside the circle, squares of 9 px leave a corner no pixels that are surely free of the circle's shade",
     "ghost": "the reflected picture is smooth and moves neighbours alike, which the stated error takes for a misfit of "
-    "the map",
-    "flicker": "as `ghost`: light that changes over a few rows moves a row of corners alike",
-    "disc-shadow": "beside the circle, its displaced shadow reaches pixels that corners use",
+    "the map; upon the circle it looks like a shadow",
+    "interlaced": "odd and even rows show two circles; the fit takes their difference for noise and states too much",
+    "phone": "a filter that keeps edges leaves a shadow's rim another form than any lens",
+    "median": "as `phone`",
+    "equalised": "as `phone`: contrast is stretched differently from tile to tile",
+    "ink-thin": "thin print moves edges as a tone curve does, and is taken for one where its edges seem to lean",
+    "misprint": "a print that is 1 % longer one way has a circle that is, too; the fit leaves it three thousandths",
 }  # by kind, why it does not hold everything
 COLUMNS = ["kind", "views", "found", "classic", "sector", "wrong", "RMS", "bias", "norm", "on shared: ours, classic",
            "ours, sector", "mean, slowest s", "classic s", "sector s"]  # fmt: skip
