@@ -31,8 +31,8 @@ and of circles {NORMALISED[0]} to {NORMALISED[1]} (20 circles tell it to 11 %), 
 REASONS = {
     "rolling-shake": "rows are moved by a wave two squares long, so that neighbours are moved against each other as by "
     "errors of their own; nothing in one picture tells that from noise, and the stated error is too large",
-    "shadow-edge": "where the shadow's edge crosses the circle, nothing tells which way the board lies; a few corners lie "
-    "on the edge itself",
+    "shadow-edge": "where the shadow's edge crosses the circle, nothing tells which way the board lies; a few corners "
+    "lie on the edge itself",
     "hot-pixels": "a black pixel upon an edge lies within the grey values of its neighbours and is not taken out; the "
     "corner is refused",
     "salt-pepper": "as `hot-pixels`",
