@@ -65,7 +65,7 @@ def _faults_of_factors(rows: pa.Table) -> Iterator[str]:
     """The factors of a frame's points are matrices of two rows, as wide as each other."""
     if "joint_factor_px" not in rows.column_names or FRAME_ID not in rows.column_names:
         return
-    lengths = with_nans(pc.list_value_length(rows["joint_factor_px"]))
+    lengths = with_nans(pc.call_function("list_value_length", [rows["joint_factor_px"]]))
     there = np.isfinite(lengths)
     lengths, frames = lengths[there], rows[FRAME_ID].to_numpy()[there]
     if np.any(lengths % 2) or np.any(lengths == 0) or np.any((np.diff(lengths) != 0) & (np.diff(frames) == 0)):

@@ -31,17 +31,17 @@ def refine_jointly(
     n = len(points_in_obj)
     whitener = np.linalg.pinv(factor.reshape(2 * n, -1), rcond=LEAST_SINGULAR)
     view = Observations.of(camera, points_in_obj, points_px[None], whitening(None, n))
-    R, t = start.R, start.t
+    pose = Pose(start.R, start.t)
     for _ in range(MOST_STEPS):
         with np.errstate(all="ignore"):
-            missed, rows = residuals_and_slopes(view, np.ascontiguousarray(R)[..., None], t[:, None])
+            missed, rows = residuals_and_slopes(view, np.ascontiguousarray(pose.R)[..., None], pose.t[:, None])
             slopes, residuals = whitener @ rows[..., 0], whitener @ missed.ravel()
         size = np.linalg.norm(slopes, axis=0)
         if not np.all((size > 0.0) & (size < np.inf)) or np.linalg.matrix_rank(slopes / size) < 6:
             return None
         normal = slopes.T @ slopes
         move = -np.linalg.solve(normal, slopes.T @ residuals)
-        R, t = rotation_from_vector(move[:3]) @ R, t + move[3:]
+        pose = Pose(rotation_from_vector(move[:3]) @ pose.R, pose.t + move[3:])
         if move @ normal @ move < STOP**2:
-            return Pose(R, t), np.linalg.inv(normal)
+            return pose, np.linalg.inv(normal)
     return None

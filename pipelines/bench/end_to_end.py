@@ -57,7 +57,7 @@ def run_stages(recipe: Recipe, poses: list[int], spent: dict[str, list[Times]] |
         def score_shard(pose: int) -> None:
             score.run_shard(dataset, dataset.shard_path("estimates", pose, shard_count(recipe), SETTING.name))
 
-        steps: list[tuple[str, Callable[[int], None]]] = [
+        steps: list[tuple[str, Callable[[int], object]]] = [
             ("generate", lambda pose: generate.run_shard(dataset, pose)),
             ("detect", lambda pose: detect.run_shard(dataset, pose, detector=Detector.EDGE_FIT)),
             ("estimate", estimate_shard),
@@ -69,7 +69,7 @@ def run_stages(recipe: Recipe, poses: list[int], spent: dict[str, list[Times]] |
                 spent.setdefault(name, []).append(times)
 
 
-def _run_step(dataset: Dataset, step: Callable[[int], None], poses: list[int]) -> None:
+def _run_step(dataset: Dataset, step: Callable[[int], object], poses: list[int]) -> None:
     for pose in poses:
         step(pose)
     dataset.write_manifest()

@@ -128,7 +128,7 @@ def _detect_chessboard(image: Grey, target: Chessboard, detector: str, check_tim
         return _nothing(count, PointStatus.CORNERS_INCONSISTENT, seen.finder)
     if too_many_bad(corners.consistent[: len(seen.ids)]):
         return _nothing(count, PointStatus.CORNERS_INCONSISTENT, seen.finder)
-    ids = np.append(seen.ids, _unseen(seen, target))[: len(corners.consistent)]
+    ids = np.append(seen.ids, _unseen(seen, target)).astype(np.int64)[: len(corners.consistent)]
     at = grid(target.inner)[ids]
     misfit = misfit_squares(corners, at)
     check_time()
@@ -185,9 +185,9 @@ def _corners(image: Grey, seen: SeenPoints, target: Chessboard, detector: str, c
     return check_placed(placed, fitted, sites.at, size)
 
 
-def _unseen(seen: SeenPoints, target: Chessboard) -> NDArray[np.intp]:
+def _unseen(seen: SeenPoints, target: Chessboard) -> NDArray[np.int64]:
     """Ids of the corners that were not seen."""
-    return np.setdiff1d(np.arange(target.circle_index), seen.ids)
+    return np.setdiff1d(np.arange(target.circle_index), seen.ids).astype(np.int64)
 
 
 def _nothing(count: int, status: PointStatus, finder: str) -> Detection:
