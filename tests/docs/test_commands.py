@@ -63,7 +63,7 @@ def test_quick_commands_run(place, cli):
     ran = set()
     for document, line in commands():
         words = tuple(shlex.split(line, comments=True))
-        if named(words) in QUICK and words not in ran:
+        if named(words) in QUICK and words not in ran and "://" not in line:  # an object store has tests of its own
             ran.add(words)
             done = cli(*words)
             assert done.code == 0, f"{document}: {line}: {done.err}"
