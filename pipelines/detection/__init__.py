@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from eposit.arrays import Array
 from pipelines.detection.board_fit import fit_board
 from pipelines.detection.board_map import grid
+from pipelines.detection.board_size import is_of_another_size
 from pipelines.detection.circle import find_circle, misfit_squares
 from pipelines.detection.consistency import Corners, check_placed, too_many_bad
 from pipelines.detection.corner_sites import chessboard_sites
@@ -133,6 +134,8 @@ def _detect_chessboard(image: Grey, target: Chessboard, detector: str, check_tim
     misfit = misfit_squares(corners, at)
     check_time()
     light = decoded(image, corners.exponent)
+    if is_of_another_size(light, corners, at, target):
+        return _nothing(count, PointStatus.OTHER_BOARD, seen.finder)
     circle = find_circle(light, corners, target, misfit)
     points, covariance = np.full((count, 2), np.nan), np.full((count, 2, 2), np.nan)
     status = np.full(count, PointStatus.POINT_NOT_FOUND, STATUS_TYPE)

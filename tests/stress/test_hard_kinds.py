@@ -30,6 +30,15 @@ def test_corners_beside_what_is_no_board_are_found(name):
 
 
 @pytest.mark.full
+@pytest.mark.parametrize(("name", "view"), [("smaller-asked", 11), ("larger-asked", 4), ("larger-asked", 19)])
+def test_a_board_of_another_size_is_told(name, view):
+    """In these views one level of the finder sees a part of the board that could be one of the size asked for."""
+    kind = KINDS[name]
+    shot = kind.shot(view)
+    assert set(answer(OURS, shot.image, kind.target).status) == {"other_board"}
+
+
+@pytest.mark.full
 @pytest.mark.parametrize("name", CIRCLES)
 def test_a_circle_is_as_far_off_as_it_states(name):
     disc = row_of(name, CIRCLES[name])["disc"]
