@@ -49,6 +49,7 @@ class Loaded(HTMLParser):
             self.addresses += [value or "" for name, value in attrs if name == LOADS[tag]]
 
 
+@pytest.mark.full
 @pytest.mark.skipif(importlib.util.find_spec("sphinx") is None, reason="needs the extra `docs`")
 def test_pages_build_without_warnings_and_load_nothing_from_the_network(tmp_path):
     options = ["--quiet", "--fail-on-warning", "--keep-going", "-d", str(tmp_path / "doctrees")]

@@ -66,6 +66,7 @@ def test_there_are_five():
     assert [len(steps) > 5 for steps in walks().values()] == [True] * 5
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("title", walks())
 def test_a_walk_is_what_a_run_does(title, calls):
     """Its steps are called in their order; other calls may lie between."""

@@ -15,6 +15,7 @@ from tests.pipelines.detection.sheets import STATED_PX, Sheet, fitted, measured,
 LEAST, MOST = 0.8, 1.3
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("lens", ["perspective", "stereographic", "equidistance", "equisolid", "orthogonal"])
 def test_a_flat_board_has_a_third_of_the_errors_through_every_lens(lens):
     found = fitted(lens)

@@ -122,6 +122,7 @@ def test_covariances_follow_the_corners(detected, errors):
     assert worst > 1.15 * best
 
 
+@pytest.mark.full
 def test_a_board_fit_has_a_third_of_the_errors_and_says_so(demo, errors):
     chosen = range(0, len(demo), 2)
     found = [detect_points(demo[i][1], TARGET, Detector.BOARD_FIT) for i in chosen]

@@ -61,6 +61,7 @@ def kept_in(folder):
     return {path for path in folder.glob(PREFIX + "*") if list(path.rglob("*.nbc"))}
 
 
+@pytest.mark.full
 def test_a_change_in_another_file_is_seen(checkout):
     """Numba alone looks at the caller's file only, and loads 2 again."""
     assert run(checkout) == (2.0, 0)
@@ -80,6 +81,7 @@ def test_a_folder_that_the_user_has_set_is_kept_to(checkout, tmp_path):
     assert not kept_in(checkout / "__pycache__")
 
 
+@pytest.mark.full
 def test_a_read_only_checkout_has_the_users_folder_and_else_a_temporary_one(checkout):
     """A file where a folder should be stops root too. Numba alone raises `cannot cache function` without a home."""
     (checkout / "__pycache__").touch()
@@ -93,6 +95,7 @@ def test_a_read_only_checkout_has_the_users_folder_and_else_a_temporary_one(chec
     assert len(kept_in(own)) == 1
 
 
+@pytest.mark.full
 def test_where_nothing_can_be_written_functions_are_compiled_all_the_same(checkout):
     (checkout / "__pycache__").touch()
     root = checkout.parents[1]

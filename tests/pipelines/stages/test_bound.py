@@ -1,6 +1,7 @@
 """The bound and `photometric` through the command line: rows in the tables, lines in the report, the same bits."""
 
 import numpy as np
+import pytest
 
 from datasets.rows import pose_covariances
 from datasets.store.dataset import open_dataset
@@ -9,6 +10,7 @@ from pipelines.report.pixel_bound import bound_rows
 from tests.own import image_rows
 
 
+@pytest.mark.full
 def test_photometric_and_the_bound_come_out_in_tables_and_report(root, cli, content):
     for words in (("estimate", root, "--estimator", "photometric"), ("bound", root), ("score", root)):
         assert cli(*words, "-q").code == 0

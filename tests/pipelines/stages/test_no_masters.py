@@ -94,6 +94,7 @@ def test_a_run_that_was_killed_before_its_first_frame_goes_on_without(place, cli
     assert open_dataset(place.new()).read("frames").num_rows == 2
 
 
+@pytest.mark.full
 def test_run_takes_the_option_too(place, cli):
     assert cli("run", place.recipe(), "--out", place.new(), "--no-masters", "-q").code == 0
     assert masters(place.new()) == []
