@@ -71,7 +71,7 @@ BEYOND_SHARE, APART_SHARE = 0.09, 0.3  # of what they differ by more, and along 
 # which a circle may be off: its shade looks like what sharpening and motion leave beside an edge
 USUALLY_LEFT, MOST_LEFT = 1.5, 30.0  # times the corners' noise that a fit leaves: no model of a disc explains more
 SIZE_LIMIT = 0.03  # of the size
-LARGE_RADIUS_PX = 60.0  # a larger circle is read in means of pixels that leave its edges this blur:
+LARGE_RADIUS_PX = 30.0  # a larger circle is read in means of pixels that leave its edges this blur:
 LEAST_BLUR_PX = 0.7  # below it the fine grid would sample them badly
 MOST_RADIUS_PX = 150.0  # a larger one is read in means whatever it costs: 0.03 px instead of 0.01, in bounded time
 LEAST_AXIS = 1.5  # blurs: a disc whose smaller half axis is below this has no edges of its own

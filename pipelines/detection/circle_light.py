@@ -30,7 +30,7 @@ Rings = tuple[tuple[float, int], ...]
 
 # Rings of shadows: heights by which they are displaced, and how many there are. Few tell whether one lamp is enough.
 STARTS = ((0.0, 1), (1.0, 6))  # where the one shadow is looked for if it seems to be in a wrong place;
-TRIED = 3  # of them are fitted
+TRIED, MANY_PIXELS = 3, 4000  # of them are fitted, and one of a patch with more pixels: each takes half a second
 FEW, FEW_SOFTNESS = ((0.5, 6), (1.2, 8), (2.4, 8)), 0.3
 MANY, MANY_SOFTNESS = ((0.4, 6), (0.8, 8), (1.2, 10), (1.8, 12), (2.6, 12)), 0.2
 SPREAD = 0.1  # of the white's grey: light that may come from each direction beyond that of lamp and surroundings
@@ -66,7 +66,7 @@ def fit_in_any_light(patch: Patch, known: Prior, height: float, light: float) ->
         starts = _best_starts(patch, known, height)
         plain = _best_of([plain, *(fit_disc(patch, replace(known, start=start)) for start in starts)], patch)
         unexplained = _unexplained(plain, patch, known, height, light)
-    if unexplained <= MISSING:
+    if unexplained <= MISSING or not plain.converged:
         return plain
     fit = fit_disc(*_lit(patch, known, MANY, MANY_SOFTNESS, height, light))
     return replace(fit, covariance=fit.covariance * LEFT_OUT**2) if fit.converged else plain
@@ -108,7 +108,8 @@ def _best_starts(patch: Patch, known: Prior, height: float) -> list[Array]:
     for place in _places(STARTS, height):
         starts.append(known.start.copy())
         starts[-1][SHADOW] = place
-    return sorted(starts, key=lambda start: cost_of(patch, known, start))[:TRIED]
+    tried = TRIED if len(patch.grey) <= MANY_PIXELS else 1
+    return sorted(starts, key=lambda start: cost_of(patch, known, start))[:tried]
 
 
 def _places(rings: Rings, height: float) -> list[tuple[float, float]]:
