@@ -15,9 +15,8 @@ LEAST_SQUARES = 5  # along a border, in the picture: fewer may look so by chance
 MOST = 0.9  # share of them that must look so
 SURELY_WHITE = 0.75  # of the way from black to white
 
-Side = tuple[
-    Array, Array, Mask
-]  # places within and beyond a border, (n, 2) squares, and which squares within are white
+# Places within and beyond a border, (n, 2) squares each, and which squares within are white.
+Side = tuple[Array, Array, Mask]
 
 
 def is_of_another_size(light: NDArray[np.float32], corners: Corners, at: Array, target: Chessboard) -> bool:

@@ -41,7 +41,7 @@ from pipelines.detection.circle_model import (
 )
 from pipelines.detection.circle_patch import Picture, circle_patch
 from pipelines.detection.consistency import Corners
-from pipelines.detection.corner_blur import SAMPLING
+from pipelines.detection.corner_blur import LIMITS_PX, SAMPLING
 from render.targets.chessboard import Chessboard
 
 WHITE_PERCENT = 95.0  # of the patch's pixels that are no brighter than its white, but for noise
@@ -211,7 +211,7 @@ def _edge_blur(corners: Corners) -> float:
     if not -USUALLY_BEYOND_PX < beyond < -PRINT_BEYOND_PX:
         return corners.blur_px
     width = math.sqrt(corners.blur_px**2 + SAMPLING) + beyond
-    return math.sqrt(max(width**2 - SAMPLING, LEAST_BLUR_PX**2))
+    return min(corners.blur_px, math.sqrt(max(width**2 - SAMPLING, LIMITS_PX[0] ** 2)))
 
 
 def misfit_squares(corners: Corners, at: Array) -> float:

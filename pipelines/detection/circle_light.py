@@ -29,8 +29,8 @@ from pipelines.detection.circle_model import (
 Rings = tuple[tuple[float, int], ...]
 
 # Rings of shadows: heights by which they are displaced, and how many there are. Few tell whether one lamp is enough.
-STARTS = ((0.0, 1), (1.0, 6))  # where the one shadow is looked for if it seems to be in a wrong place;
-TRIED, MANY_PIXELS = 3, 4000  # of them are fitted, and one of a patch with more pixels: each takes half a second
+STARTS = ((0.0, 1), (1.0, 6))  # where the one shadow is looked for if it seems to be in a wrong place
+TRIED, MANY_PIXELS = 3, 4000  # of these starts are fitted, and one of a patch with more pixels, for its time
 FEW, FEW_SOFTNESS = ((0.5, 6), (1.2, 8), (2.4, 8)), 0.3
 MANY, MANY_SOFTNESS = ((0.4, 6), (0.8, 8), (1.2, 10), (1.8, 12), (2.6, 12)), 0.2
 SPREAD = 0.1  # of the white's grey: light that may come from each direction beyond that of lamp and surroundings
@@ -38,13 +38,9 @@ MUCH_CLIPPED = 0.1  # of the pixels: edges look sharper than they are, and littl
 DOUBTFUL = 1.1  # times as much as is left of the residuals with further shadows: the one may be in a wrong place
 MISSING = 1.2  # likewise: one lamp does not explain them
 AS_GOOD = 1.01, 1.1  # times the residuals of the best, and where much is clipped
-NO_SLOPE, STRAY_SLOPE = (
-    1e-6,
-    0.02,
-)  # of the white's grey over a radius: of the disc's grey, and where light strays on it
-STRAY_GAIN = (
-    15.0  # by which the sum of squares must be less with such a slope, in variances: noise does so once in 2000
-)
+# Of the white's grey over a radius: the slope of the disc's grey, and where light strays on it. With the latter the sum
+# of squares must be less by so many variances; noise makes it so once in 2000.
+NO_SLOPE, STRAY_SLOPE, STRAY_GAIN = 1e-6, 0.02, 15.0
 POSSIBLE = 0.1  # of the white's grey: light that a fit may lack or have too much, by noise and rims of other forms
 LEFT_OUT = 1.5  # times the stated error of a fit with many shadows: a lamp may stand between two directions
 

@@ -232,7 +232,7 @@ def _task(board: BoardMap, jacobian: Array, sites: CornerSites, shapes: Array, r
 
 def _is_corner(fitted: Array, covariance: Array, starts: Array, jacobian: Array, sites: CornerSites) -> Mask:
     """(n,) which fits have a covariance, and found a corner of the right sense near where it was looked for."""
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", over="ignore"):
         side = np.sqrt(np.abs(np.linalg.det(jacobian)))
         good = np.linalg.norm(fitted[:, :2] - starts, axis=1) <= START_LIMIT * side
         good &= fitted[:, CONTRAST] * sites.sense > 0.0
