@@ -18,7 +18,7 @@ from scipy.optimize import minimize_scalar
 
 from eposit.arrays import Array
 from pipelines.detection.board_map import BoardMap, grid
-from pipelines.detection.circle_light import MUCH_CLIPPED, NO_SLOPE, fit_in_any_light
+from pipelines.detection.circle_light import MANY_CELLS, MUCH_CLIPPED, NO_SLOPE, fit_in_any_light
 from pipelines.detection.circle_model import (
     BLOCKED,
     DISC_GREY,
@@ -45,7 +45,8 @@ from pipelines.detection.corner_blur import LIMITS_PX, SAMPLING
 from render.targets.chessboard import Chessboard
 
 WHITE_PERCENT = 95.0  # of the patch's pixels that are no brighter than its white, but for noise
-SHARPENED, SHARPENED_TO = (1.0, 2.6, 0.25), 0.01  # times as blurred as they look, from, to, by; how well it is found
+SHARPENED = 1.0, 2.3, 0.3  # times as blurred as they look: from, to, by; then so many steps to what fits best
+SHARPENED_STEPS = 6
 START_SHADOW = (0.18, 0.18, 0.18)  # place and softness, in heights of the circle above the board
 SIZE_SPREAD = 0.003  # the board's map gives the size to this: nearer or farther it looks the same to five in a thousand
 FORM_SPREAD, MISFIT_SLOPES = 0.0015, 6.0  # print longer one way; misfits of the map, squares, that its slopes are off
@@ -58,7 +59,10 @@ CORNER_PX = 0.01  # an ordinary corner's uncertainty, of which that of the map f
 ASPECT_SPREAD = 0.02  # of pixels that are not known to be square; or as far as the map's are from it
 LENS_SPREAD = (100.0, 100.0, 0.3, 0.3, 0.3)  # of the rest of a lens of which nothing is known: see `generic_lens`
 SURE_SHARE = 0.01  # of a square: a prediction less sure than this has the circle looked for around it
-LOOKS = (5, 9)  # places along both axes of the ellipse in which a circle is looked for
+LOOKS, FEWER_LOOKS = (
+    (5, 9),
+    (3, 7),
+)  # places along both axes of the ellipse in which a circle is looked for; a large one
 LOOK_SPREADS = 10.0  # half its axes, in deviations of the prediction: it is far from linear
 GOOD_SHARE = 1.2  # of the residuals of the best fit in the ellipse, up to which a fit from the prediction is kept
 FAR_SPREADS = 3.0  # of the prediction that a circle may lie off, for each that a linear map allows
@@ -202,7 +206,7 @@ class _Place:
         looks = np.arange(*SHARPENED)
         best = int(np.argmin([left(share) for share in looks]))
         between = looks[max(best - 1, 0)], looks[min(best + 1, len(looks) - 1)]
-        return float(minimize_scalar(left, bounds=between, method="bounded", options={"xatol": SHARPENED_TO}).x)
+        return float(minimize_scalar(left, bounds=between, method="bounded", options={"maxiter": SHARPENED_STEPS}).x)
 
 
 def _edge_blur(corners: Corners) -> float:
@@ -257,9 +261,10 @@ def _best_start(patch: Patch, known: Prior, unsure: Array, radius: float) -> Arr
 
     unsure: (2, 2) covariance of the prediction, squares^2. radius: of the circle, squares.
     """
+    looks = LOOKS if patch.blocked.size <= MANY_CELLS else FEWER_LOOKS
     variances, axes = np.linalg.eigh(unsure)
     reach = np.minimum(LOOK_SPREADS * np.sqrt(np.maximum(variances, 0.0)), FARTHEST_SHARE) / radius
-    minor, major = (np.linspace(-far, far, count) for far, count in zip(reach, LOOKS, strict=True))
+    minor, major = (np.linspace(-far, far, count) for far, count in zip(reach, looks, strict=True))
     starts = [
         known.start + np.append(a * axes[:, 0] + b * axes[:, 1], np.zeros(SHAPE - 2)) for a in minor for b in major
     ]

@@ -30,7 +30,7 @@ Rings = tuple[tuple[float, int], ...]
 
 # Rings of shadows: heights by which they are displaced, and how many there are. Few tell whether one lamp is enough.
 STARTS = ((0.0, 1), (1.0, 6))  # where the one shadow is looked for if it seems to be in a wrong place
-TRIED, MANY_PIXELS = 3, 4000  # of these starts are fitted, and one of a patch with more pixels, for its time
+TRIED, MANY_CELLS = 3, 20000  # of these starts are fitted, and one where the fine grid has more cells, for its time
 FEW, FEW_SOFTNESS = ((0.5, 6), (1.2, 8), (2.4, 8)), 0.3
 MANY, MANY_SOFTNESS = ((0.4, 6), (0.8, 8), (1.2, 10), (1.8, 12), (2.6, 12)), 0.2
 SPREAD = 0.1  # of the white's grey: light that may come from each direction beyond that of lamp and surroundings
@@ -104,7 +104,7 @@ def _best_starts(patch: Patch, known: Prior, height: float) -> list[Array]:
     for place in _places(STARTS, height):
         starts.append(known.start.copy())
         starts[-1][SHADOW] = place
-    tried = TRIED if len(patch.grey) <= MANY_PIXELS else 1
+    tried = TRIED if patch.blocked.size <= MANY_CELLS else 1
     return sorted(starts, key=lambda start: cost_of(patch, known, start))[:tried]
 
 

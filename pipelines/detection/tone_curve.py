@@ -15,8 +15,9 @@ import itertools
 import numpy as np
 from numpy.typing import NDArray
 
+from eposit.arrays import Array
 from pipelines.detection.board_map import BoardMap
-from pipelines.detection.corner_blur import edge_profiles
+from pipelines.detection.corner_blur import edge_profiles, measured_blur
 from pipelines.detection.corner_sites import CornerSites
 from pipelines.detection.finders import Grey
 from pipelines.spread import NORMAL_MAD
@@ -27,7 +28,8 @@ EXPONENTS = np.linspace(1.0, 3.2, 12)  # of the curve grey = light^(1 / exponent
 SURE = 4.0  # standard errors that the exponent must differ from 1
 LEAST_EXPONENT = 1.1  # below it a correction is smaller than what else moves edges
 LEAST_PROFILES = 8
-SURELY_PX = 0.005  # by which edges must lean more after a correction than before, where it was none
+LEAN = 0.03  # blurs by which a curve makes edges lean for each by which its exponent exceeds 1: a gaussian edge's
+LEAST_LEAN, SURE_LEAN = 0.25, 2.0  # of that, less so many standard errors: samples half a pixel apart show a half of it
 
 
 def decoded(image: Grey, exponent: float) -> Light:
@@ -47,10 +49,7 @@ def measured_exponent(image: Grey, board: BoardMap, sites: CornerSites) -> float
         after = _growth(decoded(image, high), board, sites)[0]
         if after >= 0.0:
             exponent = low + before / (before - after) * (high - low)
-            if exponent < LEAST_EXPONENT:
-                return 1.0
-            leaner = _lean(image, exponent, board, sites) > _lean(image, 1.0, board, sites) + SURELY_PX
-            return 1.0 if leaner else exponent
+            return exponent if exponent >= LEAST_EXPONENT and _leans(image, exponent, board, sites) else 1.0
         before = after
     return 1.0
 
@@ -66,20 +65,27 @@ def _growth(light: Light, board: BoardMap, sites: CornerSites) -> tuple[float, f
     half = 0.5 * (profiles.shares.shape[1] - 1)
     beyond = profiles.step_px * (half - np.sum(profiles.shares, axis=1) + 0.5)
     beyond = np.where(profiles.rises, beyond, -beyond)
-    middle = float(np.median(beyond))
-    spread = NORMAL_MAD * float(np.median(np.abs(beyond - middle)))
-    return middle, spread * float(np.sqrt(0.5 * np.pi / len(beyond)))
+    return _median(beyond)
 
 
-def _lean(image: Grey, exponent: float, board: BoardMap, sites: CornerSites) -> float:
-    """By how many px the middle of an edge's grey values lies beside that of its light, the median over edges."""
-    profiles = edge_profiles(decoded(image, exponent), board, sites)
+def _median(values: Array) -> tuple[float, float]:
+    """The median of some numbers, and its standard error."""
+    middle = float(np.median(values))
+    spread = NORMAL_MAD * float(np.median(np.abs(values - middle)))
+    return middle, spread * float(np.sqrt(0.5 * np.pi / len(values)))
+
+
+def _leans(image: Grey, exponent: float, board: BoardMap, sites: CornerSites) -> bool:
+    """Whether edges lean as such a curve makes them: the mean of their grey values lies beside the middle one."""
+    light = decoded(image, 1.0)
+    profiles = edge_profiles(light, board, sites)
     if profiles is None:
-        return 0.0
+        return False
     shares, rows = profiles.shares, np.arange(len(profiles.shares))
     after = np.clip(np.argmax(shares >= 0.5, axis=1), 1, shares.shape[1] - 1)
     low, high = shares[rows, after - 1], shares[rows, after]
     halfway = after - (high - 0.5) / np.maximum(high - low, 1e-9)
     mean = shares.shape[1] - 0.5 - np.sum(shares, axis=1)
-    lean = profiles.step_px * np.where(profiles.rises, mean - halfway, halfway - mean)
-    return abs(float(np.median(lean)))
+    lean, error = _median(profiles.step_px * np.where(profiles.rises, mean - halfway, halfway - mean))
+    expected = LEAN * (exponent - 1.0) * measured_blur(light, board, sites)
+    return lean + SURE_LEAN * error > LEAST_LEAN * expected

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from tests.stress.answers import OURS, answer
+from pipelines.detection import detect_points
+from tests.stress.answers import OURS, answer, target_of
 from tests.stress.kinds import KINDS
 from tests.stress.measures import measured
 
@@ -44,3 +45,11 @@ def test_a_circle_is_as_far_off_as_it_states(name):
     disc = row_of(name, CIRCLES[name])["disc"]
     assert disc["found"] == 1
     assert np.sqrt(disc["normalised"] / 2.0) < FAR
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(("name", "least", "most"), [("ink-thin", 1.0, 1.0), ("gamma", 2.0, 2.4)])
+def test_thin_print_is_no_tone_curve(name, least, most):
+    """Both make white squares grow; the curve alone makes edges lean."""
+    kind = KINDS[name]
+    assert least <= detect_points(kind.shot(0).image, target_of(kind.target)).exponent <= most
