@@ -11,20 +11,30 @@ from typing import Annotated
 
 import typer
 
+from datasets.errors import UserError
 from datasets.url_path import dataset_folder
+
+
+def _folder(text: str) -> Path:
+    """A folder or a URL as `dataset_folder` reads it, whose refusal the option's own message holds."""
+    try:
+        return dataset_folder(text)
+    except UserError as error:
+        raise typer.BadParameter(str(error)) from None
+
 
 Out = Annotated[
     Path,
     typer.Option(
         "--out",
         metavar="DIR",
-        parser=dataset_folder,
+        parser=_folder,
         help="Folder of the dataset, or a URL as s3://bucket/demo; a run that stopped is resumed there.",
     ),
 ]
 Folder = Annotated[
     Path,
-    typer.Argument(metavar="DIR", parser=dataset_folder, help="Folder of a dataset, or its URL as s3://bucket/demo."),
+    typer.Argument(metavar="DIR", parser=_folder, help="Folder of a dataset, or its URL as s3://bucket/demo."),
 ]
 RecipeName = Annotated[str, typer.Argument(metavar="RECIPE", help="A .toml file, or a name from `recipes`.")]
 ShownRecipe = Annotated[str | None, typer.Argument(metavar="[RECIPE]", help="Show its values beside the keys.")]
@@ -54,7 +64,7 @@ Reuse = Annotated[
     Path | None,
     typer.Option(
         metavar="DIR",
-        parser=dataset_folder,
+        parser=_folder,
         help="Dataset whose linear light is taken where it shows the same views.",
     ),
 ]

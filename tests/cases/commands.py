@@ -65,7 +65,9 @@ def _circles(folder, out):
         return f"exit code {code}: {said[:100]}"
     dataset = open_dataset(out)
     found, truth = (dataset.read(table) for table in ("detections", "keypoints"))
-    both = found.join(truth, ["frame_id", "point_id"], right_suffix="_true", join_type="inner")
+    both = found.drop_columns("joint_factor_px").join(
+        truth, ["frame_id", "point_id"], right_suffix="_true", join_type="inner"
+    )
     both = both.filter(pc.equal(both["point_id"], pc.max(both["point_id"])))
     ok = both.filter(pc.equal(both["status"], "ok"))
     names = ("x_px", "y_px", "x_px_true", "y_px_true", "var_x_px2", "cov_xy_px2", "var_y_px2")
