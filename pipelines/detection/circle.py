@@ -19,14 +19,14 @@ from scipy.optimize import minimize_scalar
 from eposit.arrays import Array
 from pipelines.detection.board_map import BoardMap, grid
 from pipelines.detection.circle_light import MANY_CELLS, MUCH_CLIPPED, NO_SLOPE, fit_in_any_light
-from pipelines.detection.circle_model import (
+from pipelines.detection.circle_model import ROUNDING, cost_of, fit_disc
+from pipelines.detection.circle_numbers import (
     BLOCKED,
     DISC_GREY,
     DISC_SLOPE,
     LAMP,
     LINEAR,
     OBLONG,
-    ROUNDING,
     SHADOW,
     SHAPE,
     SIZE,
@@ -36,8 +36,6 @@ from pipelines.detection.circle_model import (
     DiscFit,
     Patch,
     Prior,
-    cost_of,
-    fit_disc,
 )
 from pipelines.detection.circle_patch import Picture, circle_patch
 from pipelines.detection.consistency import Corners
@@ -49,7 +47,7 @@ SHARPENED = 1.0, 2.3, 0.3  # times as blurred as they look: from, to, by; then s
 SHARPENED_STEPS = 6
 START_SHADOW = (0.18, 0.18, 0.18)  # place and softness, in heights of the circle above the board
 SIZE_SPREAD = 0.003  # the board's map gives the size to this: nearer or farther it looks the same to five in a thousand
-FORM_SPREAD, MISFIT_SLOPES = 0.0015, 6.0  # print longer one way; misfits of the map, squares, that its slopes are off
+FORM_SPREAD, MISFIT_SLOPES = 0.0001, 6.0  # likewise its form; and misfits of the map, squares, that its slopes are off
 SHADOW_SPREAD, SOFTNESS_MEAN, SOFTNESS_SPREAD = 0.9, 0.15, 0.15  # heights
 FURTHEST_SHADOW = 3.6  # heights
 LEAST_CONTRAST = 0.35  # of the board's: what a circle's edge must have

@@ -11,19 +11,18 @@ from dataclasses import replace
 import numpy as np
 
 from eposit.arrays import Array
-from pipelines.detection.circle_model import (
+from pipelines.detection.circle_model import cost_of, fit_disc, shadow_of
+from pipelines.detection.circle_numbers import (
     BLOCKED,
     DISC_SLOPE,
     LAMP,
+    OBLONG,
     SHADOW,
     SHAPE,
     WHITE_GREY,
     DiscFit,
     Patch,
     Prior,
-    cost_of,
-    fit_disc,
-    shadow_of,
 )
 
 Rings = tuple[tuple[float, int], ...]
@@ -38,9 +37,9 @@ MUCH_CLIPPED = 0.1  # of the pixels: edges look sharper than they are, and littl
 DOUBTFUL = 1.1  # times as much as is left of the residuals with further shadows: the one may be in a wrong place
 MISSING = 1.2  # likewise: one lamp does not explain them
 AS_GOOD = 1.01, 1.1  # times the residuals of the best, and where much is clipped
-# Of the white's grey over a radius: the slope of the disc's grey, and where light strays on it. With the latter the sum
-# of squares must be less by so many variances; noise makes it so once in 2000.
-NO_SLOPE, STRAY_SLOPE, STRAY_GAIN = 1e-6, 0.02, 15.0
+NO_SLOPE, STRAY_SLOPE = 1e-6, 0.02  # of the disc's grey over a radius, times the white's; and where light strays on it
+PRINT_SPREAD = 0.01  # of the form, where the print is longer one way
+SURE_GAIN = 15.0  # variances by which either must make the sum of squares less: noise does so once in 2000
 POSSIBLE = 0.1  # of the white's grey: light that a fit may lack or have too much, by noise and rims of other forms
 LEFT_OUT = 1.5  # times the stated error of a fit with many shadows: a lamp may stand between two directions
 
@@ -52,15 +51,16 @@ def fit_in_any_light(patch: Patch, known: Prior, height: float, light: float) ->
 
     height: of the circle above the board, radii. light: grey value of the white.
     """
-    plain = fit_disc(patch, known)
-    stray = _with_stray_light(known, light)
-    if plain.residual * len(patch.grey) - cost_of(patch, stray, plain.values[:SHAPE]) > STRAY_GAIN * plain.residual:
+    plain, known = _in_any_form(fit_disc(patch, known), patch, known)
+    stray = _with_spread(known, DISC_SLOPE, STRAY_SLOPE * light)
+    if plain.residual * len(patch.grey) - cost_of(patch, stray, plain.values[:SHAPE]) > SURE_GAIN * plain.residual:
         known = stray
         plain = fit_disc(patch, known)
     unexplained = _unexplained(plain, patch, known, height, light)
     if unexplained > DOUBTFUL or not _is_possible(plain) or patch.clipped > MUCH_CLIPPED:
         starts = _best_starts(patch, known, height)
         plain = _best_of([plain, *(fit_disc(patch, replace(known, start=start)) for start in starts)], patch)
+        plain, known = _in_any_form(plain, patch, known)
         unexplained = _unexplained(plain, patch, known, height, light)
     if unexplained <= MISSING or not plain.converged:
         return plain
@@ -68,10 +68,18 @@ def fit_in_any_light(patch: Patch, known: Prior, height: float, light: float) ->
     return replace(fit, covariance=fit.covariance * LEFT_OUT**2) if fit.converged else plain
 
 
-def _with_stray_light(known: Prior, light: float) -> Prior:
-    """What is known where the disc's own grey may have a slope."""
+def _in_any_form(fit: DiscFit, patch: Patch, known: Prior) -> tuple[DiscFit, Prior]:
+    """The fit, again where the print seems to be longer one way, and what was known for it."""
+    if fit.oblong <= SURE_GAIN:
+        return fit, known
+    known = _with_spread(known, OBLONG, PRINT_SPREAD)
+    return fit_disc(patch, replace(known, start=fit.values[:SHAPE])), known
+
+
+def _with_spread(known: Prior, which: slice, value: float) -> Prior:
+    """What is known, but less of some numbers."""
     spread = known.spread.copy()
-    spread[DISC_SLOPE] = STRAY_SLOPE * light
+    spread[which] = value
     return replace(known, spread=spread)
 
 

@@ -16,20 +16,29 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from eposit.arrays import Array
+from pipelines.detection.circle_numbers import (
+    BLOCKED,
+    DISC_GREY,
+    DISC_SLOPE,
+    FURTHER,
+    LAMP,
+    LINEAR,
+    OBLONG,
+    SHADOW,
+    SHAPE,
+    SOFTNESS,
+    WHITE_GREY,
+    WHITE_SLOPE,
+    DiscFit,
+    Patch,
+    Places,
+    Prior,
+)
 from pipelines.detection.erf import GAUSS, decay, signed_share
 from pipelines.detection.kernels import compiled
 
-Places = NDArray[np.intp]
-# Numbers of a fit: disc x, y, in radii from where it is expected, its size as a ratio, and by how much it is longer
-# along x than along y and along one diagonal than along the other, as shares; shadow x, y from the foot and the
-# softness of its rim, in radii; then k, w, gx, gy, hx, hy (per radius), A, L in grey values; then L of m more shadows.
-SHAPE, LINEAR = 8, 8
-SIZE, OBLONG, SHADOW, SOFTNESS = 2, slice(3, 5), slice(5, 7), 7
-DISC_GREY, WHITE_GREY, WHITE_SLOPE, DISC_SLOPE, BLOCKED, LAMP, FURTHER = 8, 9, slice(10, 12), slice(12, 14), 14, 15, 16
-MOVES = 5  # numbers that move the disc
 SECTORS = 12  # of the disc's surroundings, whose residuals are held against each other
 USUAL_SCATTER = 1.5  # of these over the noise: a picture that the model explains stays below
 FURTHEST_STEP = np.array([0.15, 0.15, 0.02, 0.02, 0.02, 0.15, 0.15, 0.05])  # in one iteration
@@ -39,46 +48,6 @@ ROUNDING = 1.0 / 12.0  # variance of a grey value that was rounded: no picture i
 STEPS = 60
 START_NOISE = 4.0  # variance, grey values^2, before any is known
 STOP = 0.5  # step, in standard deviations of what is fitted, at which a fit has converged; it is still made
-
-
-@dataclass(frozen=True, slots=True)
-class Patch:
-    """A part of the image around the circle, and the fine grid over it in radii of the circle."""
-
-    grey: Array  # (n,) grey values of the pixels that take part
-    rows: Places  # (n,) of these pixels
-    columns: Places  # (n,)
-    on_board: Array  # (2, h, w) places of the fine grid on the board, from the circle's foot
-    on_disc: Array  # (2, h, w) places on the circle's plane, from its centre
-    slope_x: Array  # (1, w) the white's slope along x for a slope of one grey value per radius
-    slope_y: Array  # (h, 1) likewise along y
-    blocked: Array  # (h, w) share of the surroundings' light that the disc blocks
-    shadows: Array  # (m, h, w) share of the light from further directions that the disc hides; m may be 0
-    per_px: Array  # (2, 2) radii per px
-    kernel: Array  # (k,) taps of the blur on the fine grid
-    finer: int  # cells of the fine grid to a pixel, along each side
-    clipped: float  # share of the board's pixels that are left out as black or white as a pixel can be
-
-
-@dataclass(frozen=True, slots=True)
-class Prior:
-    """What is known before the pixels are looked at."""
-
-    start: Array  # (8,) shape to start from
-    mean: Array  # (16 + m,)
-    spread: Array  # (16 + m,) standard deviations
-    furthest_shadow: float  # radii
-
-
-@dataclass(frozen=True, slots=True)
-class DiscFit:
-    """The fit of one disc."""
-
-    values: Array  # (16 + m,)
-    covariance: Array  # (16 + m, 16 + m)
-    converged: bool
-    residual: float  # mean square, grey values^2
-    unexplained: float  # factor of the covariance for what the model leaves out; 1 where it explains the picture
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,12 +166,13 @@ def fit_disc(patch: Patch, prior: Prior) -> DiscFit:
             factor = _unexplained(patch, jacobian, best, covariance)
             moved = _rim_doubt(patch, values, np.linalg.solve(normal, jacobian.T))
             covariance = covariance * factor + np.outer(moved, moved)
-            return DiscFit(values, covariance, True, float(best @ best / len(best)), factor)
+            oblong = _gain_of_form(normal, right, weigh, values - prior.mean) / noise
+            return DiscFit(values, covariance, True, float(best @ best / len(best)), factor, oblong)
         trial = values.copy()
         trial[:SHAPE] += np.clip(step[:SHAPE], -FURTHEST_STEP, FURTHEST_STEP)
         trial[SHADOW] = np.clip(trial[SHADOW], -prior.furthest_shadow, prior.furthest_shadow)
         trial[SOFTNESS] = np.clip(trial[SOFTNESS], *SOFTNESS_LIMITS)
-    return DiscFit(values, np.linalg.inv(normal) * noise, False, float(best @ best / len(best)), 1.0)
+    return DiscFit(values, np.linalg.inv(normal) * noise, False, float(best @ best / len(best)), 1.0, 0.0)
 
 
 def shadow_of(on_board: Array, place: tuple[float, float], softness: float) -> Array:
@@ -273,6 +243,18 @@ def _unexplained(patch: Patch, jacobian: Array, residual: Array, covariance: Arr
     noise = _noise(jacobian, residual)
     scatter = np.trace(np.linalg.solve(covariance[:2, :2], moved.T @ moved)) / (2.0 * noise**2)
     return max(1.0, float(scatter) / USUAL_SCATTER)
+
+
+def _gain_of_form(normal: Array, right: Array, weigh: Array, off: Array) -> float:
+    """By how much the sum of squares would be less without what is known of the form, to first order.
+
+    normal, right: normal equations. weigh: of what is known, in them. off: how far the numbers are from it.
+    """
+    free, pull = normal.copy(), right.copy()
+    form = np.arange(len(right))[OBLONG]
+    free[form, form] -= weigh[form]
+    pull[form] += weigh[form] * off[form]
+    return float(pull @ np.linalg.solve(free, pull))
 
 
 def _rim_doubt(patch: Patch, values: Array, solved: Array) -> Array:

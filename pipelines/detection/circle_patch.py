@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from eposit.arrays import Array, Mask
 from pipelines.detection.board_map import BoardMap
-from pipelines.detection.circle_model import Patch
+from pipelines.detection.circle_numbers import Patch
 from pipelines.detection.finders import Grey
 from pipelines.detection.kernels import compiled
 from render.targets.chessboard import Chessboard

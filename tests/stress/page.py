@@ -44,7 +44,7 @@ REASONS = {
     "median": "as `phone`",
     "equalised": "as `phone`: contrast is stretched differently from tile to tile",
     "ink-thin": "thin print moves edges as a tone curve does, and is taken for one where its edges seem to lean",
-    "misprint": "a print that is 1 % longer one way has a circle that is, too; the fit expects a thousandth or two",
+    "misprint": "a print that is 1 % longer one way has a circle that is, too; the form is fitted where that shows",
 }  # by kind, why it does not hold everything
 COLUMNS = ["kind", "views", "found", "classic", "sector", "wrong", "RMS", "bias", "norm", "on shared: ours, classic",
            "ours, sector", "mean, slowest s", "classic s", "sector s"]  # fmt: skip

@@ -1,0 +1,59 @@
+"""The numbers of a circle's fit, what is known of them beforehand, and the pixels that it reads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eposit.arrays import Array
+
+Places = NDArray[np.intp]
+# Numbers of a fit: disc x, y, in radii from where it is expected, its size as a ratio, and by how much it is longer
+# along x than along y and along one diagonal than along the other, as shares; shadow x, y from the foot and the
+# softness of its rim, in radii; then k, w, gx, gy, hx, hy (per radius), A, L in grey values; then L of m more shadows.
+SHAPE, LINEAR = 8, 8
+SIZE, OBLONG, SHADOW, SOFTNESS = 2, slice(3, 5), slice(5, 7), 7
+DISC_GREY, WHITE_GREY, WHITE_SLOPE, DISC_SLOPE, BLOCKED, LAMP, FURTHER = 8, 9, slice(10, 12), slice(12, 14), 14, 15, 16
+
+
+@dataclass(frozen=True, slots=True)
+class Patch:
+    """A part of the image around the circle, and the fine grid over it in radii of the circle."""
+
+    grey: Array  # (n,) grey values of the pixels that take part
+    rows: Places  # (n,) of these pixels
+    columns: Places  # (n,)
+    on_board: Array  # (2, h, w) places of the fine grid on the board, from the circle's foot
+    on_disc: Array  # (2, h, w) places on the circle's plane, from its centre
+    slope_x: Array  # (1, w) the white's slope along x for a slope of one grey value per radius
+    slope_y: Array  # (h, 1) likewise along y
+    blocked: Array  # (h, w) share of the surroundings' light that the disc blocks
+    shadows: Array  # (m, h, w) share of the light from further directions that the disc hides; m may be 0
+    per_px: Array  # (2, 2) radii per px
+    kernel: Array  # (k,) taps of the blur on the fine grid
+    finer: int  # cells of the fine grid to a pixel, along each side
+    clipped: float  # share of the board's pixels that are left out as black or white as a pixel can be
+
+
+@dataclass(frozen=True, slots=True)
+class Prior:
+    """What is known before the pixels are looked at."""
+
+    start: Array  # (8,) shape to start from
+    mean: Array  # (16 + m,)
+    spread: Array  # (16 + m,) standard deviations
+    furthest_shadow: float  # radii
+
+
+@dataclass(frozen=True, slots=True)
+class DiscFit:
+    """The fit of one disc."""
+
+    values: Array  # (16 + m,)
+    covariance: Array  # (16 + m, 16 + m)
+    converged: bool
+    residual: float  # mean square, grey values^2
+    unexplained: float  # factor of the covariance for what the model leaves out; 1 where it explains the picture
+    oblong: float  # by how many variances the sum of squares would be less if nothing were known of its form
