@@ -106,12 +106,20 @@ def _digest(header: Header, channels: Channels) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """A header's value as JSON has it; numbers as the file keeps them, in 32 bits."""
+    """A header's value as JSON has it; numbers as the file keeps them, in 32 bits.
+
+    Raises:
+        DamagedExrError: a value of a kind that we do not write.
+    """
     if isinstance(value, tuple):
         return [_plain(item) for item in value]
     if isinstance(value, np.ndarray):
         return [float(number) for number in value.ravel()]
-    return float(np.float32(value)) if isinstance(value, float) else value
+    if isinstance(value, float):
+        return float(np.float32(value))
+    if not isinstance(value, (int, str)):
+        raise DamagedExrError("its header holds a value of another kind than was written")
+    return value
 
 
 def _check_size(size: int, header: Header) -> None:

@@ -34,6 +34,15 @@ def test_an_exr_that_claims_too_many_pixels(last, tmp_path):
         read_exr(path)
 
 
+def test_an_exr_whose_header_has_a_type_that_nobody_knows(tmp_path):
+    """A library keeps such a value as bytes: it is none of ours."""
+    path = tmp_path / "a.exr"
+    write_exr(path, {"key": "k", "background": 0.25}, {"Y": np.ones((8, 8), np.float32)})
+    path.write_bytes(path.read_bytes().replace(b"background\0float\0", b"background\0flo.t\0"))
+    with pytest.raises(DamagedExrError, match="another kind"):
+        read_exr(path)
+
+
 @pytest.mark.parametrize("kind", ["fifo", "large", "deep"])
 def test_a_recipe_that_never_ends(kind, tmp_path, cli):
     path = tmp_path / "recipe.toml"
