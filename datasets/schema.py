@@ -192,7 +192,8 @@ ESTIMATES = pa.schema(
         _field(
             "covariance_unreliable",
             pa.bool_(),
-            "whether the cost is no parabola as the covariance states it. Null: no pose, or the solver does not tell",
+            "whether the cost is no parabola as the covariance states it, or contradicts the stated errors of the points. "
+            "Null: no pose, or the solver does not tell",
         ),
     ]
 )

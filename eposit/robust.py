@@ -9,11 +9,11 @@ import numpy as np
 
 from eposit.arrays import Array, Mask
 from eposit.camera import Camera
+from eposit.chi_square import chi_square_limit
 from eposit.problem import workspace
 from eposit.solution import Solution, Status, in_order, join, without_pose
 
 LEAST_POINTS = 8  # two may be exchanged: of the six others three give a pose, and three confirm it
-CONTRADICTION = 5.0  # standard deviations of a chi-square's cube root from which a fit contradicts its sigma: 3e-7
 
 # -2 log of the likelihood of a wrong point that lies at a right one's place, beside a right one's: it may lie anywhere
 # in some 400 x 400 standard deviations. Poses whose likelihoods differ by less are rivals.
@@ -89,11 +89,5 @@ def _likeliest(chosen: Mask, sums: Array, variance: float) -> tuple[Mask, Mask]:
 
 
 def _contradicts(solution: Solution) -> Mask:
-    """(b,) mask of costs above the chi-square's quantile.
-
-    Source:
-        Wilson and Hilferty 1931: the cube root of a chi-square over its freedom is nearly normal.
-    """
-    freedom = 2.0 * np.sum(solution.inliers, axis=-1) - 6.0
-    share = 2.0 / (9.0 * freedom)
-    return np.asarray(solution.cost) > freedom * (1.0 - share + CONTRADICTION * np.sqrt(share)) ** 3
+    """(b,) mask of costs that contradict the stated sigma."""
+    return np.asarray(solution.cost) > chi_square_limit(2.0 * np.sum(solution.inliers, axis=-1) - 6.0)

@@ -77,7 +77,7 @@ class Solution:
     cost: float | Array = np.nan  # sum of squared residuals, px^2, or over their variances where sigma is known
     alternatives: Alternatives = field(default_factory=Alternatives.none)
     ambiguous: bool | Mask = False  # an alternative is nearly as likely: the data do not decide between them
-    covariance_unreliable: bool | Mask = False  # the cost is not the parabola that the covariance states
+    covariance_unreliable: bool | Mask = False  # the cost is not the parabola that it states, or contradicts sigma
 
     def first(self) -> Solution:
         """The single problem of a batch of one, without its leading axis."""

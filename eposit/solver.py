@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from eposit.arrays import Array, Mask, as_numbers, shown
 from eposit.camera import Camera
+from eposit.chi_square import chi_square_limit
 from eposit.compiled.layout import LINEAR_RESULT, RESULT
 from eposit.problem import as_bearings, as_camera, as_object, as_pixels, as_weights, workspace
 from eposit.results import solve_batch, solve_one
@@ -60,7 +61,7 @@ def solve(
         "best"; `ambiguous`: the likelihood of one is more than a hundredth of the pose's. The covariance is that of
         "best", from the curvature of the cost, widened along the two least known rotations where the cost rises less
         than that three standard deviations away; `covariance_unreliable`: there the cost is not within a factor of
-        1.5 of the parabola. The other methods do not weigh their points and state none: NaN.
+        1.5 of the parabola, or the residuals contradict sigma_px (wrong points, or another camera or object). The other methods do not weigh their points and state none: NaN.
     Raises:
         ValueError: wrong shapes, fewer than four points (eight with `robust`), non-finite object points, an unknown
             method or sigma, or an argument of a type that it cannot have.
@@ -129,11 +130,12 @@ def _best(
     from eposit.compiled.machine_code import native
 
     n, w = len(obj), workspace(camera, len(obj))
+    most = variance * chi_square_limit(2.0 * n - 6.0) if variance > 0.0 and n > 3 else np.inf
 
     def run(pixels: Array, out: Array) -> None:
         native(solve_best)(
             w.ctypes.data, n, obj.ctypes.data, pixels.ctypes.data, weights.ctypes.data, len(weights), len(pixels),
-            variance, refine, DECISIVE, BENT, out.ctypes.data,
+            variance, refine, DECISIVE, BENT, most, out.ctypes.data,
         )  # fmt: skip
 
     return (solve_one if single else solve_batch)(run, pixels, RESULT, variance or 1.0)

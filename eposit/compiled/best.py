@@ -179,14 +179,15 @@ def find_minima(w, n, whole, pixels, row, refine):
     return state
 
 
-@compiled(NOTHING, W, WHOLE, POINTER, POINTER, POINTER, WHOLE, WHOLE, NUMBER, WHOLE, NUMBER, NUMBER, POINTER)
-def solve_best(w, n, points, pixels, weights, m, b, variance, refine, decisive, bent, out):
+@compiled(NOTHING, W, WHOLE, POINTER, POINTER, POINTER, WHOLE, WHOLE, NUMBER, WHOLE, NUMBER, NUMBER, NUMBER, POINTER)
+def solve_best(w, n, points, pixels, weights, m, b, variance, refine, decisive, bent, most, out):
     """Solve b images of the same points into out (b, RESULT).
 
     w: workspace with LENS and INTRINSICS written. points (n, 3); pixels (b, n, 2); weights (m, 3): inverse covariances
     in px^-2 (xx, xy, yy), m = n or 1 for all points. variance: what the weights are to be divided by, px^2; 0 where it
     is unknown and the residuals tell. refine: 1 to descend to minima. decisive: -2 log of the likelihood ratio below
-    which two minima are not decided. bent: `departure` above which the covariance is unreliable.
+    which two minima are not decided. bent: `departure` above which the covariance is unreliable; most: cost above
+    which it is, too, as the residuals contradict the weights.
     """
     place(w, n, points)
     whole = describe(w, n)
@@ -201,7 +202,7 @@ def solve_best(w, n, points, pixels, weights, m, b, variance, refine, decisive, 
         scale = variance if variance > 0.0 else cost / (2.0 * n - 6.0)
         inverse(w, FACTORS, HESSIAN)
         bends = known > 0 and refine == 1 and departure(w, n, max(scale, FLOOR_PX * FLOOR_PX)) > bent
-        out[o + UNRELIABLE] = 1.0 if bends else 0.0
+        out[o + UNRELIABLE] = 1.0 if bends or (known > 0 and cost > most) else 0.0
         out[o + AMBIGUOUS] = 1.0 if known > 1 and undecided(w, n, variance, decisive) else 0.0
         write_covariance(w, scale, out, o + COVARIANCE)
         out[o + RMSE] = math.sqrt((cost if plain or known == 0 else squares_px(w, n, MINIMA)) / n)
