@@ -192,7 +192,7 @@ ESTIMATES = pa.schema(
         _field(
             "covariance_unreliable",
             pa.bool_(),
-            "whether the cost is no parabola as the covariance states it, or contradicts the stated errors of the points. "
+            "whether the cost is no parabola as the covariance states it, or contradicts the points' stated errors. "
             "Null: no pose, or the solver does not tell",
         ),
     ]

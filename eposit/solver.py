@@ -61,7 +61,8 @@ def solve(
         "best"; `ambiguous`: the likelihood of one is more than a hundredth of the pose's. The covariance is that of
         "best", from the curvature of the cost, widened along the two least known rotations where the cost rises less
         than that three standard deviations away; `covariance_unreliable`: there the cost is not within a factor of
-        1.5 of the parabola, or the residuals contradict sigma_px (wrong points, or another camera or object). The other methods do not weigh their points and state none: NaN.
+        1.5 of the parabola, or the residuals contradict sigma_px (wrong points, or another camera or object). The other
+        methods do not weigh their points and state none: NaN.
     Raises:
         ValueError: wrong shapes, fewer than four points (eight with `robust`), non-finite object points, an unknown
             method or sigma, or an argument of a type that it cannot have.

@@ -39,8 +39,8 @@ PoseFiles = Annotated[
     typer.Option(
         "--poses",
         metavar="FILE",
-        help="Poses of another system for the pinned pictures, .csv or .parquet, as poses-{regime}.csv if there are "
-        "several regimes; may be given again.",
+        help="Poses of another system for the pinned pictures, as poses-{regime}.csv if there are several regimes; may "
+        "be given again.",
     ),
 ]
 PoseNames = Annotated[
@@ -74,6 +74,7 @@ def run(
     estimator: Estimators = None,
     poses: PoseFiles = None,
     name: PoseNames = None,
+    pose_format: o.PoseFormat = "table",
     time_limit: TimeLimit = 3600.0,
     without: Without = None,
     workers: o.Workers = 1,
@@ -99,7 +100,9 @@ def run(
         history=history,
         regimes=regimes,
         seed=int(f"{datetime.date.today():%Y%m%d}") if seed is None else seed,
-        systems=asked(recipe, regimes, (solver or [], estimator or []), (poses or [], name or []), time_limit),
+        systems=asked(
+            recipe, regimes, (solver or [], estimator or []), (poses or [], name or [], pose_format), time_limit
+        ),
         workers=workers,
         without=tuple(without or ()),
     )

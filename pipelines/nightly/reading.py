@@ -92,7 +92,7 @@ def _import(dataset: Dataset, files: Sequence[PoseFile]) -> tuple[str, ...]:
     told: list[str] = []
     for item in files:
         path = item.path(regime_of(dataset.recipe.sensor) or "")
-        imported = import_poses(dataset, path, item.system)
+        imported = import_poses(dataset, path, item.system, item.form)
         told += [imported.warning] if imported.warning else []
         if imported.missing:
             told.append(f"{path} has no pose for {imported.missing} of {frames} frames, which count as failures")

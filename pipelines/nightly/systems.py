@@ -18,6 +18,7 @@ from pipelines.nightly.other_code import CHOOSE_CODE, LIMIT_S, Code, OtherCodeEr
 from pipelines.nightly.suites import PINNED, READ, suites
 from pipelines.nightly.user_files import UserFiles
 from pipelines.stages.import_poses import poses_of
+from pipelines.stages.pose_formats import TABLE
 from pipelines.stages.settings import Setting, System
 
 REGIME = "{regime}"  # stands for the sensor regime in the name of a file of poses
@@ -82,6 +83,7 @@ class PoseFile:
 
     given: str  # the file's name, with `REGIME` where there are several
     system: System
+    form: str = TABLE  # of `pose_formats.FORMATS`
 
     def path(self, regime: str) -> Path:
         """The file of a sensor regime."""
@@ -107,13 +109,13 @@ def asked(
     recipe: str,
     regimes: Sequence[str],
     functions: tuple[Sequence[str], Sequence[str]],
-    poses: tuple[Sequence[str], Sequence[str]],
+    poses: tuple[Sequence[str], Sequence[str], str],
     limit_s: float,
 ) -> Systems:
     """What a night estimates: ours, and what is asked for beside it.
 
-    functions: names of solvers and of estimators. poses: files and their names, which are read once, so that a wrong
-    one is told before anything is rendered. limit_s: that a function may take on one suite.
+    functions: names of solvers and of estimators. poses: files, their names and their form; they are read once, so
+    that a wrong one is told before anything is rendered. limit_s: that a function may take on one suite.
 
     Raises:
         UserError: an unknown name, not one name for each file, one file for several regimes, or a file that is wrong.
@@ -127,22 +129,26 @@ def asked(
     return Systems(
         READ + tuple(item for item in settings if item not in own and item not in READ),
         tuple(Function(item) for item in own),
-        _pose_files(poses[0], poses[1], {item.regime: item.recipe for item in suites(PINNED, recipe, regimes)}),
+        _pose_files(*poses, {item.regime: item.recipe for item in suites(PINNED, recipe, regimes)}),
         limit_s,
     )
 
 
-def _pose_files(given: Sequence[str], names: Sequence[str], recipes: dict[str, Recipe]) -> tuple[PoseFile, ...]:
+def _pose_files(
+    given: Sequence[str], names: Sequence[str], form: str, recipes: dict[str, Recipe]
+) -> tuple[PoseFile, ...]:
     """recipes: the pinned pictures' by sensor regime."""
     if len(given) != len(names) or len(set(names)) != len(names):
         raise UserError("--poses and --name go together; give each file of poses a name of its own")
-    found = tuple(PoseFile(file, System(name)) for file, name in zip(given, names, strict=True))
+    if not given and form != TABLE:
+        raise UserError("--pose-format goes with --poses; leave it out, or give files of poses")
+    found = tuple(PoseFile(file, System(name), form) for file, name in zip(given, names, strict=True))
     for item in found:
         if len(recipes) > 1 and REGIME not in item.given:
             told = f"--poses {item.given} is one file for {len(recipes)} regimes, whose frames have the same numbers"
             raise UserError(f"{told}; write {REGIME} in its name, as poses-{REGIME}.csv, or give one --regime")
         for regime, own in recipes.items():
-            poses_of(item.path(regime), item.system, range(frame_count(own)), f"pinned-{regime}")
+            poses_of(item.path(regime), item.system, range(frame_count(own)), f"pinned-{regime}", form)
     return found
 
 

@@ -33,11 +33,17 @@ def test_a_function_that_cannot_be_called_is_one_sentence(name, tmp_path, cli, m
 
 
 WRONG_POSES = {
-    "no name": ((["poses.csv"], []), "--poses and --name go together"),
-    "one name for two": ((["poses.csv", "poses.csv"], ["a", "a"]), "give each file of poses a name of its own"),
-    "missing": ((["nosuch.csv"], ["theirs"]), "cannot read nosuch.csv"),
-    "unknown frame": ((["poses.csv"], ["theirs"]), "frame_id 99, which pinned-typical has not; its frames are 0 to 5"),
-    "name": ((["poses.csv"], ["a b"]), "name 'a b' is not usable"),
+    "no name": ((["poses.csv"], [], "table"), "--poses and --name go together"),
+    "one name for two": ((["poses.csv", "poses.csv"], ["a", "a"], "table"), "give each file of poses a name"),
+    "missing": ((["nosuch.csv"], ["theirs"], "table"), "cannot read nosuch.csv"),
+    "unknown frame": (
+        (["poses.csv"], ["theirs"], "table"),
+        "frame_id 99, which pinned-typical has not; its frames are 0 to 5",
+    ),
+    "name": ((["poses.csv"], ["a b"], "table"), "name 'a b' is not usable"),
+    "form": ((["poses.csv"], ["theirs"], "rosbag"), "unknown --pose-format 'rosbag'; give one of table, kitti"),
+    "table as tum": ((["poses.csv"], ["theirs"], "tum"), "poses.csv"),
+    "form of nothing": (([], [], "tum"), "--pose-format goes with --poses"),
 }
 
 
@@ -53,7 +59,7 @@ def test_wrong_poses_are_told_before_anything_is_rendered(name, tmp_path, monkey
 
 def test_one_file_of_poses_for_two_regimes_is_refused():
     with pytest.raises(UserError, match=r"write \{regime\} in its name, as poses-\{regime\}.csv, or give one --regime"):
-        asked("nightly-smoke", ["typical", "harsh"], ([], []), (["poses.csv"], ["theirs"]), 60.0)
+        asked("nightly-smoke", ["typical", "harsh"], ([], []), (["poses.csv"], ["theirs"], "table"), 60.0)
 
 
 @pytest.mark.parametrize("given", ["0", "-1", "nan", "inf"])
