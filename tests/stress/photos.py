@@ -25,6 +25,7 @@ from tests.stress.boards import Board
 from tests.stress.measures import AMBIGUOUS, OK
 from tests.stress.running import children
 
+STARTS = (0.2, 0.3, 0.4, 0.55)  # focal lengths in picture widths from which a fish-eye lens is calibrated
 LEAST_SHARE = 0.5  # of a board's corners with which its picture goes into the calibration
 COLUMNS = ["set", "pictures", "found: ours, classic, sector", "corners of ours", "refused by ours, found by OpenCV",
            "pictures all found", "RMS ours", "RMS classic", "RMS sector", "slowest of ours, s"]  # fmt: skip
@@ -111,19 +112,23 @@ def _residual(corners, ours, board, lens, size):
     y, x = np.mgrid[0 : board.inner[1], 0 : board.inner[0]]
     plane = np.stack((x.ravel(), y.ravel(), 0.0 * x.ravel()), axis=1)
     good = [np.isfinite(c[:, 0]) & np.isfinite(o[:, 0]) for c, o in zip(corners, ours, strict=True)]
-    objects = [plane[g].astype(np.float32)[:, None] for g in good]
-    images = [_upright(c, board)[g].astype(np.float32)[:, None] for c, g in zip(corners, good, strict=True)]
+    objects = [plane[g].astype(np.float32)[None] for g in good]
+    images = [_upright(c, board)[g].astype(np.float32)[None] for c, g in zip(corners, good, strict=True)]
     if lens == "pinhole":
-        rms = cv2.calibrateCamera(objects, images, size, None, None)[0]
-    else:
-        flags = cv2.fisheye.CALIB_RECOMPUTE_EXTRINSIC | cv2.fisheye.CALIB_FIX_SKEW
-        first = np.array([[size[0] / 3.0, 0.0, size[0] / 2.0], [0.0, size[0] / 3.0, size[1] / 2.0], [0.0, 0.0, 1.0]])
-        stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 200, 1e-8)
-        first, coefficients = np.array(first), np.zeros((4, 1))
-        flags |= cv2.fisheye.CALIB_USE_INTRINSIC_GUESS
-        objects, images = ([a.astype(np.float64) for a in of] for of in (objects, images))
-        rms = cv2.fisheye.calibrate(objects, images, size, first, coefficients, flags=flags, criteria=stop)[0]
-    return float(rms) / np.sqrt(2.0)
+        return float(cv2.calibrateCamera(objects, images, size, None, None)[0]) / np.sqrt(2.0)
+    objects, images = ([a.astype(np.float64) for a in of] for of in (objects, images))
+    return min(_fisheye_rms(objects, images, size, size[0] * share) for share in STARTS) / np.sqrt(2.0)
+
+
+def _fisheye_rms(objects, images, size, focal):
+    """OpenCV's root of the mean squared distance, px, from one focal length; infinite where it gives up."""
+    flags = cv2.CALIB_RECOMPUTE_EXTRINSIC | cv2.CALIB_FIX_SKEW | cv2.CALIB_USE_INTRINSIC_GUESS
+    stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 200, 1e-8)
+    first = np.array([[focal, 0.0, size[0] / 2.0], [0.0, focal, size[1] / 2.0], [0.0, 0.0, 1.0]])
+    try:
+        return float(cv2.fisheye.calibrate(objects, images, size, first, np.zeros((4, 1)), flags=flags, criteria=stop)[0])
+    except cv2.error:
+        return np.inf
 
 
 def _upright(corners, board):
