@@ -72,7 +72,7 @@ USUALLY_BEYOND_PX = 0.1  # by which edges differ from those of a gaussian blur i
 PRINT_BEYOND_PX = 0.025  # from which on it is print that runs
 BEYOND_SHARE, APART_SHARE = 0.09, 0.3  # of what they differ by more, and along one axis more than along the other, by
 # which a circle may be off: its shade looks like what sharpening and motion leave beside an edge
-USUALLY_LEFT, MOST_LEFT = 1.5, 30.0  # times the corners' noise that a fit leaves: no model of a disc explains more
+USUALLY_LEFT, MOST_LEFT = 1.3, 30.0  # times the corners' noise that a fit leaves: no model of a disc explains more
 SIZE_LIMIT = 0.03  # of the size
 LARGE_RADIUS_PX = 30.0  # a larger circle is read in means of pixels that leave its edges this blur:
 LEAST_BLUR_PX = 0.7  # below it the fine grid would sample them badly
@@ -152,7 +152,7 @@ class _Place:
         dark = fit.values[WHITE_GREY] - fit.values[DISC_GREY] > LEAST_CONTRAST * self.corners.contrast
         if not dark or not _is_near(shift * self.radius, self.unsure):
             return None
-        covariance = to_px @ fit.covariance[:2, :2] @ to_px.T * max(1.0, left / USUALLY_LEFT)
+        covariance = to_px @ fit.covariance[:2, :2] @ to_px.T * max(1.0, left / USUALLY_LEFT) ** 2
         return Circle(centre + to_px @ shift, covariance + self._doubt(to_px @ shift))
 
     def _doubt(self, off: Array) -> Array:
