@@ -174,13 +174,14 @@ class _Place:
             blur_px *= self._sharpened(blur_px)
             patch = self._patch(blur_px)
         around = self._patch(blur_px, doubt) if doubt else None
-        fits = [] if patch is None else [self._fit(patch, self._known(patch))]
+        looks = [] if patch is None else [(patch, self._known(patch))]
         if around is not None:
             known = self._known(around)
-            fits.append(self._fit(around, replace(known, start=_best_start(around, known, self.unsure, self.radius))))
-        if not fits:
-            return None
-        return fits[0] if fits[0].residual <= GOOD_SHARE * fits[-1].residual + ROUNDING else fits[-1]
+            start = _best_start(around, known, self.unsure, self.radius)
+            looks.append((around, replace(known, start=start)))
+        if len(looks) == 2:
+            looks = [_better(*looks)]
+        return self._fit(*looks[0]) if looks else None
 
     def _patch(self, blur_px: float, doubt: float = 0.0) -> Patch | None:
         return circle_patch(self.image, self.corners.board, self.seen, blur_px, self.target, doubt)
@@ -206,6 +207,14 @@ class _Place:
         best = int(np.argmin([left(share) for share in looks]))
         between = looks[max(best - 1, 0)], looks[min(best + 1, len(looks) - 1)]
         return float(minimize_scalar(left, bounds=between, method="bounded", options={"maxiter": SHARPENED_STEPS}).x)
+
+
+def _better(first: tuple[Patch, Prior], second: tuple[Patch, Prior]) -> tuple[Patch, Prior]:
+    """Of two looks for a circle the one that one lamp explains better, the first if both do as well, to go on from."""
+    fits = [fit_disc(*look) for look in (first, second)]
+    which = int(fits[0].residual > GOOD_SHARE * fits[1].residual + ROUNDING)
+    patch, known = (first, second)[which]
+    return patch, replace(known, start=fits[which].values[:SHAPE])
 
 
 def _edge_blur(corners: Corners) -> float:
