@@ -18,26 +18,11 @@ from scipy.optimize import minimize_scalar
 
 from eposit.arrays import Array
 from pipelines.detection.board_map import BoardMap, grid
-from pipelines.detection.circle_light import MANY_CELLS, MUCH_CLIPPED, NO_SLOPE, fit_in_any_light
+from pipelines.detection.circle_light import MANY_CELLS, MUCH_CLIPPED, fit_in_any_light
 from pipelines.detection.circle_model import ROUNDING, cost_of, fit_disc
-from pipelines.detection.circle_numbers import (
-    BLOCKED,
-    DISC_GREY,
-    DISC_SLOPE,
-    LAMP,
-    LINEAR,
-    OBLONG,
-    SHADOW,
-    SHAPE,
-    SIZE,
-    SOFTNESS,
-    WHITE_GREY,
-    WHITE_SLOPE,
-    DiscFit,
-    Patch,
-    Prior,
-)
+from pipelines.detection.circle_numbers import DISC_GREY, SHAPE, SIZE, WHITE_GREY, DiscFit, Patch, Prior
 from pipelines.detection.circle_patch import Picture, circle_patch
+from pipelines.detection.circle_prior import known_beforehand
 from pipelines.detection.consistency import Corners
 from pipelines.detection.corner_blur import LIMITS_PX, SAMPLING
 from render.targets.chessboard import Chessboard
@@ -45,12 +30,6 @@ from render.targets.chessboard import Chessboard
 WHITE_PERCENT = 95.0  # of the patch's pixels that are no brighter than its white, but for noise
 SHARPENED = 1.0, 2.3, 0.3  # times as blurred as they look: from, to, by; then so many steps to what fits best
 SHARPENED_STEPS = 6
-START_SHADOW = (0.18, 0.18, 0.18)  # place and softness, in heights of the circle above the board
-SIZE_SPREAD = 0.003  # the board's map gives the size to this: nearer or farther it looks the same to five in a thousand
-FORM_SPREAD = 0.0005  # likewise its form: print is a little longer one way, and blur is not quite a gaussian
-MISFIT_SLOPES = 6.0  # misfits of the map, squares, that its slopes are off
-SHADOW_SPREAD, SOFTNESS_MEAN, SOFTNESS_SPREAD = 0.9, 0.15, 0.15  # heights
-FURTHEST_SHADOW = 3.6  # heights
 LEAST_CONTRAST = 0.35  # of the board's: what a circle's edge must have
 SEARCH_SHARE = 0.1  # of a square: how far the centre may lie from where the board predicts it, if its map is sure
 FARTHEST_SHARE = 0.25  # of a square, however unsure it is
@@ -158,7 +137,7 @@ class _Place:
     def _doubt(self, off: Array) -> Array:
         """(2, 2) px^2, beyond that of the fit, of a circle that lies so far (2,) px off its prediction."""
         corners = np.median(self.corners.covariance_px2[self.corners.consistent], axis=0)
-        along_x, along_y = np.nan_to_num(self.corners.widths_beyond_px)
+        along_x, along_y = self._beyond
         beyond = max(abs(along_x), abs(along_y), USUALLY_BEYOND_PX) - USUALLY_BEYOND_PX
         apart = max(abs(along_x - along_y), USUALLY_BEYOND_PX) - USUALLY_BEYOND_PX
         misfit = self.misfit * math.sqrt(abs(np.linalg.det(self.seen[1]))) / self.radius
@@ -180,7 +159,8 @@ class _Place:
             start = _best_start(around, known, self.unsure, self.radius)
             looks.append((around, replace(known, start=start)))
         if len(looks) == 2:
-            looks = [_better(*looks)]
+            first, second = (fit_disc(*look).residual for look in looks)
+            looks = looks[int(first > GOOD_SHARE * second + ROUNDING) :]
         return self._fit(*looks[0]) if looks else None
 
     def _patch(self, blur_px: float, doubt: float = 0.0) -> Patch | None:
@@ -190,7 +170,13 @@ class _Place:
         return fit_in_any_light(patch, known, self.height, self._light(patch))
 
     def _known(self, patch: Patch) -> Prior:
-        return _beforehand(self._light(patch), self.height, self.misfit)
+        return known_beforehand(self._light(patch), self.height, self.misfit, max(map(abs, self._beyond)))
+
+    @property
+    def _beyond(self) -> tuple[float, float]:
+        """Px by which the corners' edges along x and y are wider than those of a gaussian blur; 0 where none tells."""
+        along_x, along_y = np.nan_to_num(self.corners.widths_beyond_px)
+        return float(along_x), float(along_y)
 
     def _light(self, patch: Patch) -> float:
         """Grey value of the white."""
@@ -207,14 +193,6 @@ class _Place:
         best = int(np.argmin([left(share) for share in looks]))
         between = looks[max(best - 1, 0)], looks[min(best + 1, len(looks) - 1)]
         return float(minimize_scalar(left, bounds=between, method="bounded", options={"maxiter": SHARPENED_STEPS}).x)
-
-
-def _better(first: tuple[Patch, Prior], second: tuple[Patch, Prior]) -> tuple[Patch, Prior]:
-    """Of two looks for a circle the one that one lamp explains better, the first if both do as well, to go on from."""
-    fits = [fit_disc(*look) for look in (first, second)]
-    which = int(fits[0].residual > GOOD_SHARE * fits[1].residual + ROUNDING)
-    patch, known = (first, second)[which]
-    return patch, replace(known, start=fits[which].values[:SHAPE])
 
 
 def _edge_blur(corners: Corners) -> float:
@@ -283,20 +261,3 @@ def _is_near(shift: Array, unsure: Array) -> bool:
     """Whether a circle that lies so many squares from its prediction is this board's."""
     allowed = FAR_SPREADS**2 * unsure + (SEARCH_SHARE / 3.0) ** 2 * np.eye(2)
     return bool(shift @ np.linalg.solve(allowed, shift) < 9.0 and np.linalg.norm(shift) < FARTHEST_SHARE)
-
-
-def _beforehand(light: float, height: float, misfit: float) -> Prior:
-    """What is known of the circle before its pixels are looked at; what is not known has a wide spread.
-
-    light: grey value of the white. height: of the circle above the board, radii.
-    """
-    start = np.array([0.0, 0.0, 1.0, 0.0, 0.0, *(height * share for share in START_SHADOW)])
-    expected, spread = np.zeros(SHAPE + LINEAR), np.full(SHAPE + LINEAR, 1e6)
-    expected[SIZE], spread[SIZE] = 1.0, math.hypot(SIZE_SPREAD, MISFIT_SLOPES * misfit)
-    spread[OBLONG] = math.hypot(FORM_SPREAD, MISFIT_SLOPES * misfit)
-    spread[SHADOW] = height * SHADOW_SPREAD
-    expected[SOFTNESS], spread[SOFTNESS] = height * SOFTNESS_MEAN, height * SOFTNESS_SPREAD
-    spread[WHITE_SLOPE], spread[DISC_SLOPE] = 0.5 * light, NO_SLOPE * light
-    expected[BLOCKED], spread[BLOCKED] = 0.3 * light, 0.3 * light
-    expected[LAMP], spread[LAMP] = 0.6 * light, 0.6 * light
-    return Prior(start, expected, spread, FURTHEST_SHADOW * height)

@@ -124,9 +124,9 @@ def _fisheye_rms(objects, images, size, focal):
     """OpenCV's root of the mean squared distance, px, from one focal length; infinite where it gives up."""
     flags = cv2.CALIB_RECOMPUTE_EXTRINSIC | cv2.CALIB_FIX_SKEW | cv2.CALIB_USE_INTRINSIC_GUESS
     stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 200, 1e-8)
-    first = np.array([[focal, 0.0, size[0] / 2.0], [0.0, focal, size[1] / 2.0], [0.0, 0.0, 1.0]])
+    lens = np.array([[focal, 0.0, size[0] / 2.0], [0.0, focal, size[1] / 2.0], [0.0, 0.0, 1.0]]), np.zeros((4, 1))
     try:
-        return float(cv2.fisheye.calibrate(objects, images, size, first, np.zeros((4, 1)), flags=flags, criteria=stop)[0])
+        return float(cv2.fisheye.calibrate(objects, images, size, *lens, flags=flags, criteria=stop)[0])
     except cv2.error:
         return np.inf
 
