@@ -114,9 +114,7 @@ def _append_many(root, ids):
         _append(root, run_id, seed)
 
 
-@pytest.mark.parametrize(
-    "delay_s", [0.03, *(pytest.param(delay_s, marks=pytest.mark.full) for delay_s in (0.0, 0.1))]
-)
+@pytest.mark.parametrize("delay_s", [0.03, *(pytest.param(delay_s, marks=pytest.mark.full) for delay_s in (0.0, 0.1))])
 def test_a_killed_append_loses_nothing(tmp_path, delay_s):
     """Whatever was there when the process was killed is whole, and the next append sweeps what it left."""
     ids = [f"{i:03d}" for i in range(500)]

@@ -179,6 +179,7 @@ def test_a_candidate_that_breaks_could_not_run(night, monkeypatch):
     assert "in broken" in done.err
 
 
+@pytest.mark.full
 def test_a_baseline_that_no_longer_imports_could_not_run(night, nights):
     """Exit code 4 in the gates that need its code; the others are judged."""
     known = (nights / FILE_NAME).read_text()
@@ -277,6 +278,7 @@ def _content(root):
     }  # fmt: skip
 
 
+@pytest.mark.full
 def test_a_night_that_is_killed_leaves_the_history_as_it_was(night, nights):
     before = _content(nights)
     words = [sys.executable, "-m", "pipelines", *map(str, QUICK), "--history", str(nights)]
