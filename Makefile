@@ -34,10 +34,14 @@ nightly: $(SETUP)  ## two small nights, the first accepted as the second's basel
 	@test -f $(NIGHTS)/baselines.toml || $(NIGHTLY) accept latest --history $(NIGHTS) --reason "the first night"
 	@$(NIGHTLY) run nightly-smoke --history $(NIGHTS) --quiet; code=$$?; echo $(NIGHTS)/report.html; exit $$code
 
+# Two threads of OpenBLAS in each of pytest's two processes wait for each other on two cores, and busily: tests of small
+# matrices take up to seven times the processor time.
+test test-full: export OPENBLAS_NUM_THREADS := 1
+
 test: $(SETUP)  ## the tests that need pip only, under 6 minutes on 2 cores
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not full and not slow"
 
-test-full: $(SETUP)  ## adds kills, a Ray cluster, an object store, and other environments: the built wheel, readers of a dataset, a browser
+test-full: $(SETUP)  ## adds long cases, kills, a Ray cluster, an object store, and other environments: the built wheel, readers of a dataset, a browser
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check "ray>=2.9" playwright
 	@# A folder of its own: it needs another pydantic than ours.
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade --target build/moto "moto[server]>=5"

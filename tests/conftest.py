@@ -11,6 +11,7 @@ import pytest
 from datasets.store.dataset import open_dataset
 from datasets.verify import verify
 from pipelines.cli import main
+from pipelines.commands import stages
 
 pytest.register_assert_rewrite("tests.wrong_input")
 from tests.object_store import server as server  # noqa: E402
@@ -71,6 +72,12 @@ def cli(capfd):
         return Outcome(code, *capfd.readouterr())
 
     return run
+
+
+@pytest.fixture
+def no_report(monkeypatch):
+    """A run leaves the report out, as its figures take seconds."""
+    monkeypatch.setattr(stages, "_report", lambda dataset: None)
 
 
 @pytest.fixture(scope="session")

@@ -125,8 +125,10 @@ def test_more_points_are_used():
     assert np.mean(many == np.pi) <= 0.05  # 9 without a solution and 2 not converged of 300 measured
 
 
-@pytest.mark.parametrize("short", [True, False])
-@pytest.mark.parametrize("n", [5, 8])
+@pytest.mark.parametrize(
+    ("n", "short"),
+    [(5, True), (8, False), *(pytest.param(*case, marks=pytest.mark.full) for case in ((5, False), (8, True)))],
+)
 def test_what_is_called_ok_has_arrived(n, short, monkeypatch):
     """Any limit of steps leaves some images on their way, and their status says so. The others are at a minimum, and
     with the limit of `solve` at the lowest, where no more steps lead elsewhere."""

@@ -93,8 +93,10 @@ def test_a_full_disk_is_one_sentence_and_the_run_goes_on_from_there(tiny, tmp_pa
     assert err.startswith("error: cannot write ")
     assert err.count("\n") == 1
     assert list(root.rglob(".tmp-*")) == []
-    assert cli("run", recipe, "--out", root, "-q").code == 0
-    assert content(root) == content(tiny[1])
+    assert cli("generate", recipe, "--out", root, "-q").code == 0
+    other = tmp_path / "other"
+    assert cli("generate", recipe, "--out", other, "-q", "--reuse", tiny[1]).code == 0
+    assert content(root) == content(other)
 
 
 def test_what_nobody_expected_is_one_sentence_with_its_traceback_in_a_file(capfd, monkeypatch, tmp_path):
@@ -116,6 +118,7 @@ def test_what_nobody_expected_is_one_sentence_with_its_traceback_in_a_file(capfd
     assert "could not be kept (No such file or directory): test_endings.py, line" in capfd.readouterr().err
 
 
+@pytest.mark.usefixtures("no_report")
 def test_a_shard_that_cannot_be_made_is_left_out_noted_and_tried_again(root, tiny, cli, monkeypatch, content):
     """Frame 1 fails in every try: the other one goes through all stages; the same command makes the rest later."""
     before = content(root)

@@ -60,7 +60,7 @@ def test_an_unusable_compiler_gives_one_sentence(name, place, cli):
     assert_refused(CASES[name], place, cli)
 
 
-@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("workers", [pytest.param(1, marks=pytest.mark.full), 2])
 def test_an_unusable_compiler_in_a_process_of_its_own(workers, place):
     library = {backend.LIBRARY_VARIABLE: fake_library("libLLVM.so")(place), "EPOSIT_VARIANT": backend.CPU_VARIANT}
     done = alone("generate", place.recipe(), "--out", place.new(), "--workers", workers, **library)

@@ -22,14 +22,24 @@ from render.targets.chessboard import Chessboard
 CAMERA = '[[cameras]]\nname = "a"\nlens = "perspective"\nfx = 300\nfy = 300\ncx = 400\ncy = 300  # px\n'
 
 
-def test_every_recipe_loads_and_plans():
-    for name in recipe_names():
-        recipe, text = load_recipe(name)
-        frames = plan(recipe)
-        assert [frames[i].frame_id for i in (0, -1)] == [0, len(frames) - 1]
-        assert parse_recipe(text, name).digest() == recipe.digest()
-        assert frame_count(recipe) == len(frames)
-        assert 0 <= shard_count(recipe) * shard_frames(recipe) - len(frames) < shard_frames(recipe)
+# A plan places and checks every frame: seconds from hundreds of frames on.
+LARGE = {"accuracy", "accuracy-near", "accuracy-steep", "nightly", "paper"}
+IN_TIERS = [pytest.param(name, marks=pytest.mark.full) if name in LARGE else name for name in recipe_names()]
+
+
+@pytest.mark.parametrize("name", recipe_names())
+def test_every_recipe_loads(name):
+    recipe, text = load_recipe(name)
+    assert parse_recipe(text, name).digest() == recipe.digest()
+    assert 0 <= shard_count(recipe) * shard_frames(recipe) - frame_count(recipe) < shard_frames(recipe)
+
+
+@pytest.mark.parametrize("name", IN_TIERS)
+def test_every_recipe_plans_the_frames_that_it_counts(name):
+    recipe, _ = load_recipe(name)
+    frames = plan(recipe)
+    assert [frames[i].frame_id for i in (0, -1)] == [0, len(frames) - 1]
+    assert frame_count(recipe) == len(frames)
 
 
 def test_the_demo_is_the_papers_helix_with_five_lenses():

@@ -59,7 +59,7 @@ def test_a_new_dataset_in_a_read_only_folder(public, cli):
         (("estimate", "--solver", "posit"), ()),
         (("estimate", "--overwrite"), ()),
         (("score",), ("scores",)),
-        (("report",), ()),
+        pytest.param(("report",), (), marks=pytest.mark.full),  # draws its figures before it writes
     ],
 )
 def test_a_stage_on_a_read_only_dataset(words, without, public, cli):

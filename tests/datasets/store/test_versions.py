@@ -12,29 +12,40 @@ import pytest
 
 from datasets.store.dataset import open_dataset
 from datasets.store.images import encode_png
+from tests.conftest import command
 from tests.old_dataset import NEW, make_old
 from tests.tables import OF_A_RUN
-from tests.wrong_input import assert_one_sentence, files, first, put_image
+from tests.wrong_input import Place, assert_one_sentence, files, first, put_image
 
 UNSUPPORTED = "has schema version 9, and this program reads 2 and 3; use the program that wrote it"
 
 
-@pytest.fixture
-def both(place, cli):
-    """A dataset of today with a failed frame, and the same as version 2 wrote it."""
+@pytest.fixture(scope="module")
+def originals(tiny, tmp_path_factory):
+    """A dataset of today with a failed frame, and the same as version 2 wrote it; no test may change them."""
+    place = Place(tmp_path_factory.mktemp("versions"), *tiny, None)
     new = place.dataset(without=["detections", "estimates", "scores"])
     put_image(new, encode_png(np.full((300, 400), 90, np.uint8)))  # no board in it
     path = first(new, "frames")
     dataset = open_dataset(new)
     dataset.write_shard(path, dataset.read_shard(path))
     for words in (("detect",), ("estimate",), ("estimate", "--solver", "eposit", "--use", "four"), ("score",)):
-        assert cli(words[0], new, *words[1:], "-q").code == 0
-    assert cli("report", new).code == 0
+        assert command(words[0], new, *words[1:], "-q") == 0
+    assert command("report", new) == 0
     old = new.with_name("old")
     shutil.copytree(new, old)
     make_old(old)
     open_dataset(old).write_manifest()
     return new, old
+
+
+@pytest.fixture
+def both(originals, tmp_path):
+    """Copies of them."""
+    copies = tuple(tmp_path / path.name for path in originals)
+    for path, copied in zip(originals, copies, strict=True):
+        shutil.copytree(path, copied)
+    return copies
 
 
 def test_rows_are_those_of_today(both):

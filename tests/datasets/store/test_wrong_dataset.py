@@ -164,7 +164,10 @@ ORDER = {
 }
 
 CASES = PLACES | FILES | ORDER
-ALONE = ("out is a file", "truncated master", "score before estimate")
+ALONE = (
+    "out is a file",
+    *(pytest.param(name, marks=pytest.mark.full) for name in ("truncated master", "score before estimate")),
+)
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -11,7 +11,6 @@ import eposit
 from datasets.errors import UserError
 from pipelines.adapters.registry import find_solver
 from pipelines.adapters.user import attempt, file_name, load_function
-from pipelines.commands import stages as commands
 from tests.cameras import PAPER_OBJECT, helix_pose, paper_camera
 from tests.own import own_module
 from tests.wrong_input import assert_one_sentence, files
@@ -46,11 +45,14 @@ def outcome(result):
     return attempt(lambda: result, "--solver own:solve", notes.append), notes
 
 
-@pytest.mark.parametrize(("workers", "command"), [(1, "estimate"), (2, "estimate"), (1, "run")])
-def test_a_wrapper_of_our_solver_gets_our_rows(workers, command, own, root, cli, monkeypatch):
+@pytest.mark.parametrize(
+    ("workers", "command"),
+    [(1, "estimate"), *(pytest.param(*case, marks=pytest.mark.full) for case in ((2, "estimate"), (1, "run")))],
+)
+@pytest.mark.usefixtures("no_report")
+def test_a_wrapper_of_our_solver_gets_our_rows(workers, command, own, root, cli):
     name = f"{own(OURS)}:solve"
     if command == "run":
-        monkeypatch.setattr(commands, "report", lambda out: None)  # its figures take time
         done = cli("run", root / "recipe.toml", "--out", root, "--solver", name)
     else:
         done = cli("estimate", root, "--solver", name, "--workers", workers)
@@ -197,6 +199,7 @@ def test_an_unusable_function_is_refused_before_anything_is_rendered(own, tiny, 
     assert not (tmp_path / "new").exists()
 
 
+@pytest.mark.full
 def test_an_unusable_result_in_another_process(own, root, cli):
     name = own("def solve(*a, **k): return 1, 2, 3, 4")
     done = cli("estimate", root, "--solver", f"{name}:solve", "--workers", 2, "-q")
@@ -213,7 +216,7 @@ FAILS_ONCE = """
 """
 
 
-@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.full)])
 def test_an_exception_is_a_row_and_is_counted(workers, own, root, cli):
     corner = [row["x_px"] for row in rows(root, "detections", "detections") if row["point_id"] == 0]
     limit = np.mean(corner)  # of the two frames one is refused

@@ -67,6 +67,10 @@ def test_the_command_measures_and_writes(cli, tmp_path):
     assert outcome.code == 0
     assert "one render of each camera" in outcome.out  # on the bar; and in the table
     assert (tmp_path / "new" / "bench.md").read_text().count("| render |") == 4  # three cameras and their sum
+
+
+@pytest.mark.full
+def test_the_command_measures_memory(cli, tmp_path):
     outcome = cli("bench", "smoke", "--memory", 6, "--out", tmp_path / "memory.md")
     assert outcome.code == 0
     assert "resident after 6 frames" in (tmp_path / "memory.md").read_text()

@@ -156,15 +156,16 @@ def test_what_is_found_is_the_centre_not_the_centroid(drawn, name):
 
 # Largest RMS of normalised errors. Near by, the shadow hides under the disc, and what the model of its rim is off
 # weighs as much as the noise; what is stated allows for it, also where it does not move the circle. Measured 0.8 to
-# 0.93; 120 numbers tell it to 0.065.
-HONEST = {"far": 1.0, "tilted": 1.1, "near": 1.05}
+# 0.93 of 60 pictures, whose 120 numbers tell it to 0.065; the near view's 40 to 0.11.
+HONEST = {"far": 1.0, "tilted": 1.1, "near": 1.15}
+DRAWS = {"far": 60, "tilted": 60, "near": 20}  # near by, a fit takes ten times as long as far away
 
 
-@pytest.mark.parametrize("name", HONEST)
+@pytest.mark.parametrize("name", ["far", *(pytest.param(name, marks=pytest.mark.full) for name in ("tilted", "near"))])
 def test_noise_moves_it_as_far_as_it_states(drawn, name):
     image, camera = drawn[name]
     truth, rng, errors, normalised = project(camera, AT[None], HEIGHT)[0], np.random.default_rng(1), [], []
-    for _ in range(60):
+    for _ in range(DRAWS[name]):
         circle = found_in(digitised(image, rng, 2.0), camera)
         assert circle is not None
         errors.append(circle.centre_px - truth)
@@ -175,7 +176,7 @@ def test_noise_moves_it_as_far_as_it_states(drawn, name):
 
 
 # Measured 1.72 and 1.06; 0.04 and 0.02 px off. Taken for one lamp, 4.1 and 6.3, and 0.16 px.
-@pytest.mark.parametrize("name", ["far", "tilted"])
+@pytest.mark.parametrize("name", ["far", pytest.param("tilted", marks=pytest.mark.full)])
 def test_the_light_of_several_lamps_is_in_what_it_states(name):
     image, camera = board_with(name, lamps=LAMPS)
     truth, rng, normalised = project(camera, AT[None], HEIGHT)[0], np.random.default_rng(4), []

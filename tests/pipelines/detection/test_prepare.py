@@ -3,6 +3,8 @@
 import subprocess
 import sys
 
+import pytest
+
 
 def test_everything_is_compiled_before_the_first_picture():
     code = (
@@ -21,6 +23,7 @@ def test_everything_is_compiled_before_the_first_picture():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
+@pytest.mark.full  # compiles
 def test_compiling_is_told_only_where_nothing_was_kept(tmp_path, monkeypatch):
     """A thread's `must_compile` is true with an empty cache, false with a full one; left early, it ends early."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))

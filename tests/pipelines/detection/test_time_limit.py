@@ -46,7 +46,7 @@ def test_a_limit_holds_until_it_is_over(monkeypatch):
         limit.check()
 
 
-@pytest.mark.parametrize("detector", [Detector.EDGE_FIT, Detector.OPENCV_SB])
+@pytest.mark.parametrize("detector", [Detector.EDGE_FIT, pytest.param(Detector.OPENCV_SB, marks=pytest.mark.full)])
 def test_every_point_of_a_picture_that_takes_too_long_is_too_late(detector, clock):
     """A limit that is over at the first look, and at each later one: the finder's, the fits', the circle's."""
     image, target = Drawing().image(), Chessboard()

@@ -98,15 +98,15 @@ def test_a_damaged_file_is_a_sentence(tmp_path, kind, damage):
 
 
 def test_two_appends_at_once_both_stand(tmp_path):
-    ids = [new_run_id(START) for _ in range(4)]
+    ids = [new_run_id(START) for _ in range(2)]
     processes = [CONTEXT.Process(target=_append, args=(tmp_path, run_id)) for run_id in ids]
     for process in processes:
         process.start()
     for process in processes:
         process.join(60)
-    assert [process.exitcode for process in processes] == [0] * 4
+    assert [process.exitcode for process in processes] == [0] * 2
     assert History(tmp_path).run_ids() == sorted(ids)
-    assert History(tmp_path).runs().num_rows == 4
+    assert History(tmp_path).runs().num_rows == 2
 
 
 def _append_many(root, ids):
@@ -114,7 +114,7 @@ def _append_many(root, ids):
         _append(root, run_id, seed)
 
 
-@pytest.mark.parametrize("delay_s", [0.0, 0.03, 0.1])
+@pytest.mark.parametrize("delay_s", [0.03, *(pytest.param(delay_s, marks=pytest.mark.full) for delay_s in (0.0, 0.1))])
 def test_a_killed_append_loses_nothing(tmp_path, delay_s):
     """Whatever was there when the process was killed is whole, and the next append sweeps what it left."""
     ids = [f"{i:03d}" for i in range(500)]

@@ -179,12 +179,12 @@ def test_a_candidate_that_breaks_could_not_run(night, monkeypatch):
     assert "in broken" in done.err
 
 
+@pytest.mark.full
 def test_a_baseline_that_no_longer_imports_could_not_run(night, nights):
     """Exit code 4 in the gates that need its code; the others are judged."""
     known = (nights / FILE_NAME).read_text()
-    copy = next(path for path in (nights / "code").iterdir())
     broken = nights / "broken"
-    shutil.copytree(copy, broken)
+    shutil.copytree(next((nights / "code").iterdir()), broken)
     (broken / "eposit" / "__init__.py").write_text("raise ImportError('no such library')\n")
     try:
         (nights / FILE_NAME).write_text(known.replace(str(ROOT), str(broken)))
@@ -226,8 +226,7 @@ def test_other_pinned_pictures_give_no_verdict(night, nights):
     finally:
         path.write_bytes(known)
     assert row["exit"] == 3
-    states = _states(row)
-    assert (states["data"], states["accuracy"]) == ("failed", "not run")
+    assert (_states(row)["data"], _states(row)["accuracy"]) == ("failed", "not run")
     assert row["sentence"].startswith("data: the pinned pictures are not the baseline's")
 
 
@@ -277,6 +276,7 @@ def _content(root):
     }  # fmt: skip
 
 
+@pytest.mark.full
 def test_a_night_that_is_killed_leaves_the_history_as_it_was(night, nights):
     before = _content(nights)
     words = [sys.executable, "-m", "pipelines", *map(str, QUICK), "--history", str(nights)]

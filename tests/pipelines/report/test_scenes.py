@@ -7,8 +7,7 @@ from pipelines.report.page import REPORT, write_report
 from tests.pipelines.pages.parsed import Page, assert_named_for_a_screen_reader
 
 
-def test_a_dataset_in_the_folder_is_shown_and_linked(tiny, tmp_path):
-    _, root = tiny
+def test_a_dataset_in_the_folder_is_shown_and_linked(root, tmp_path):
     outer = tmp_path / "outer"
     shutil.copytree(root, outer)
     shutil.copytree(root, outer / "room")

@@ -36,7 +36,7 @@ def test_a_white_sheet_in_a_white_world_cannot_be_seen():
 
 
 @pytest.mark.parametrize(("kind", "roughness"), [("rough_plastic", 0.15), ("laminated", 0.0)])
-@pytest.mark.parametrize("tilt_deg", [0.0, 60.0])
+@pytest.mark.parametrize("tilt_deg", [pytest.param(0.0, marks=pytest.mark.full), 60.0])
 def test_paint_and_gloss_add_up_to_the_whole_surface(kind, roughness, tilt_deg):
     material = surface(kind, roughness, WHITE)
     parts = coat(material)

@@ -30,6 +30,7 @@ def small(tmp_path_factory):
     return history, _written(folder, history, shown=synthetic.shown(2))
 
 
+@pytest.mark.full
 def test_a_year_of_a_hundred_slices_is_small(tmp_path):
     history = synthetic.history(tmp_path / "history", 365, 100)
     text = _written(tmp_path, history, shown=synthetic.shown(MOST_PICTURES))
