@@ -8,6 +8,7 @@ to the kernel: process ids are used again, and mean nothing in another container
 
 from __future__ import annotations
 
+import itertools
 import os
 import platform
 import re
@@ -99,13 +100,12 @@ def _try_lock(descriptor: int, *, alone: bool) -> State:
 
 
 def sweep(root: Path) -> None:
-    """Remove the temporary files under a folder whose process of this host has ended; those of others stay.
+    """Remove the temporary files whose process of this host has ended, under a folder and among the machine's own.
 
-    Those of an object store lie among the machine's own.
+    Those of other processes stay. In an object store there are none.
     """
-    is_url = isinstance(root, UrlPath)
-    found = Path(tempfile.gettempdir()).glob(f"{SCRATCH_PREFIX}*") if is_url else root.rglob(f"{TEMPORARY_PREFIX}*")
-    for path in found:
+    below = [] if isinstance(root, UrlPath) else root.rglob(f"{TEMPORARY_PREFIX}*")
+    for path in itertools.chain(below, Path(tempfile.gettempdir()).glob(f"{SCRATCH_PREFIX}*")):
         if path.is_file() and state_of(path) is State.GONE:
             path.unlink(missing_ok=True)
 
@@ -157,9 +157,30 @@ def local_copy(path: Path) -> Iterator[Path]:
     if not isinstance(path, UrlPath):
         yield path
         return
-    with _scratch_file(path.name) as temporary:
-        temporary.write_bytes(path.read_bytes())
+    with local_file(path.read_bytes(), path.name) as here:
+        yield here
+
+
+@contextmanager
+def local_file(content: bytes, name: str) -> Iterator[Path]:
+    """A file of this machine with some content, for libraries that read nothing else. name: at the end of its own.
+
+    Raises:
+        OSError: the disk for temporary files refuses.
+    """
+    with _scratch_file(name) as temporary:
+        temporary.write_bytes(content)
         yield temporary
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a file that is never half there.
+
+    Raises:
+        OSError: the system refuses.
+    """
+    with replace_atomically(path) as temporary:
+        temporary.write_bytes(content)
 
 
 @contextmanager
