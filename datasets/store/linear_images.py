@@ -137,7 +137,12 @@ def _region(window: tuple[np.ndarray, np.ndarray]) -> Region:
 
 def linear_path(frame_id: int) -> str:
     """Path of a frame's linear image in its dataset's folder."""
-    return f"{MASTERS}/{frame_id:06d}.exr"
+    return f"{MASTERS}/{linear_name(frame_id)}"
+
+
+def linear_name(frame_id: int) -> str:
+    """Name of a frame's linear image, as a file or in an archive."""
+    return f"{frame_id:06d}.exr"
 
 
 def linear_key(recipe: Recipe, frame: Frame) -> str:

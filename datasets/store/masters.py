@@ -20,6 +20,7 @@ from datasets.store.linear_images import (
     MASTERS,
     LinearImageError,
     linear_key,
+    linear_name,
     linear_path,
     read_linear,
     read_linear_bytes,
@@ -65,7 +66,7 @@ def archive_path(shard: range) -> str:
 
 def archive_names(shard: range) -> list[str]:
     """The members of an archive in their order."""
-    return [Path(linear_path(frame_id)).name for frame_id in shard]
+    return [linear_name(frame_id) for frame_id in shard]
 
 
 def shard_of(recipe: Recipe, frame_id: int) -> range:
