@@ -29,7 +29,9 @@ except ImportError:  # a system without flock: files of others are then never ta
     fcntl = None
 
 TEMPORARY_PREFIX = ".tmp-"
-SCRATCH_PREFIX = ".eposit-"  # of files among the machine's temporary ones, on their way to or from an object store
+SCRATCH_PREFIX = (
+    ".eposit-"  # of files among the machine's temporary ones: out of an archive, to or from an object store
+)
 OWN_NAME = re.compile(r"\.[a-z]+-(?P<host>.+)-\d+-[0-9a-f]{16}")
 NAME_LIMIT = 64  # letters of a host's name, and of a target's name, in a temporary one: 255 bytes is a name's limit
 TRIES = 100
