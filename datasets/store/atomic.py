@@ -8,6 +8,7 @@ to the kernel: process ids are used again, and mean nothing in another container
 
 from __future__ import annotations
 
+import itertools
 import os
 import platform
 import re
@@ -28,7 +29,9 @@ except ImportError:  # a system without flock: files of others are then never ta
     fcntl = None
 
 TEMPORARY_PREFIX = ".tmp-"
-SCRATCH_PREFIX = ".eposit-"  # of files among the machine's temporary ones, on their way to or from an object store
+SCRATCH_PREFIX = (
+    ".eposit-"  # of files among the machine's temporary ones: out of an archive, to or from an object store
+)
 OWN_NAME = re.compile(r"\.[a-z]+-(?P<host>.+)-\d+-[0-9a-f]{16}")
 NAME_LIMIT = 64  # letters of a host's name, and of a target's name, in a temporary one: 255 bytes is a name's limit
 TRIES = 100
@@ -99,13 +102,12 @@ def _try_lock(descriptor: int, *, alone: bool) -> State:
 
 
 def sweep(root: Path) -> None:
-    """Remove the temporary files under a folder whose process of this host has ended; those of others stay.
+    """Remove the temporary files whose process of this host has ended, under a folder and among the machine's own.
 
-    Those of an object store lie among the machine's own.
+    Those of other processes stay. In an object store there are none.
     """
-    is_url = isinstance(root, UrlPath)
-    found = Path(tempfile.gettempdir()).glob(f"{SCRATCH_PREFIX}*") if is_url else root.rglob(f"{TEMPORARY_PREFIX}*")
-    for path in found:
+    below = [] if isinstance(root, UrlPath) else root.rglob(f"{TEMPORARY_PREFIX}*")
+    for path in itertools.chain(below, Path(tempfile.gettempdir()).glob(f"{SCRATCH_PREFIX}*")):
         if path.is_file() and state_of(path) is State.GONE:
             path.unlink(missing_ok=True)
 
@@ -157,9 +159,30 @@ def local_copy(path: Path) -> Iterator[Path]:
     if not isinstance(path, UrlPath):
         yield path
         return
-    with _scratch_file(path.name) as temporary:
-        temporary.write_bytes(path.read_bytes())
+    with local_file(path.read_bytes(), path.name) as here:
+        yield here
+
+
+@contextmanager
+def local_file(content: bytes, name: str) -> Iterator[Path]:
+    """A file of this machine with some content, for libraries that read nothing else. name: at the end of its own.
+
+    Raises:
+        OSError: the disk for temporary files refuses.
+    """
+    with _scratch_file(name) as temporary:
+        temporary.write_bytes(content)
         yield temporary
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a file that is never half there.
+
+    Raises:
+        OSError: the system refuses.
+    """
+    with replace_atomically(path) as temporary:
+        temporary.write_bytes(content)
 
 
 @contextmanager

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from datasets.recipe.model import Recipe
 from datasets.schema import dictionary
+from datasets.store.kept_masters import Kept
 
 DEFAULT_TABLE = "frames"  # of `load_dataset(folder)`
 CONVENTIONS = (
@@ -13,14 +14,20 @@ CONVENTIONS = (
     "points into the camera frame. Failed rows keep their place with a status and nulls."
 )
 
+NOTES = {
+    Kept.NOT: "Linear images were not kept: `master` names files that are not there.",
+    Kept.ARCHIVES: "Linear images are packed: the last part of `master` is the name in its shard's ZIP archive, "
+    "masters/FIRST-LAST.zip, which is named by its first and last frame.",
+}
 
-def card(recipe: Recipe, frames: int, tables: Sequence[str], *, with_masters: bool) -> str:
+
+def card(recipe: Recipe, frames: int, tables: Sequence[str], kept: Kept) -> str:
     """The card as Markdown behind YAML.
 
     tables: those that have shards, as a configuration without files is an error for who loads any of them.
-    with_masters: whether linear images are kept.
+    kept: how linear images are.
     """
-    note = "" if with_masters else " Linear images were not kept: `master` names files that are not there."
+    note = f" {NOTES[kept]}" if kept in NOTES else ""
     return (
         f"{_configurations(tables)}# {recipe.name}\n\n{recipe.description}\n\n{frames} frames. {CONVENTIONS}{note}\n\n"
         f"## Tables\n\n{dictionary()}"

@@ -13,7 +13,7 @@ from datasets.errors import UserError
 from datasets.recipe.model import Recipe, load_recipe
 from datasets.store.atomic import TEMPORARY_PREFIX, create_text, sweep, write_text
 from datasets.store.dataset import RECIPE_FILE, Dataset
-from datasets.store.linear_images import settle_kept
+from datasets.store.kept_masters import Kept, settle_kept
 from datasets.store.lock import LOCK_PREFIX, hold
 from datasets.store.provenance import Provenance
 from datasets.store.refusals import refused
@@ -33,18 +33,18 @@ def claim(
     *,
     shared: bool = False,
     provenance: Provenance | None = None,
-    keep_masters: bool = True,
+    kept: Kept = Kept.FILES,
 ) -> Iterator[Dataset]:
     """Bind a folder to one recipe, so that a second run resumes and another recipe cannot blend in, and hold it.
 
     Of two that claim a new folder at the same moment one succeeds; so does the other if it has the same recipe and both
     are `shared`. The folder is held while the body runs, as `datasets.store.lock` tells.
 
-    provenance: of what the body writes, for the manifest. keep_masters: whether a new dataset keeps its linear images;
-    one that has begun goes on as it began.
+    provenance: of what the body writes, for the manifest. kept: how a new dataset keeps its linear images; one that
+    has begun goes on as it began.
 
     Raises:
-        UserError: the folder holds another recipe, other files or linear images that are not to be kept; another
+        UserError: the folder holds another recipe, other files or keeps linear images in another way; another
             process writes it; or it cannot be written.
     """
     _check(root, recipe)
@@ -55,7 +55,7 @@ def claim(
     with hold(root, shared=shared):
         if not _check(root, recipe):
             _bind(root, recipe, text)
-        settle_kept(root, keep=keep_masters)
+        settle_kept(root, kept)
         sweep(root)
         yield Dataset(root, as_begun(recipe, root), provenance)
 

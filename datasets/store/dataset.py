@@ -21,9 +21,9 @@ from datasets.schema import FRAME_ID, READABLE, SCHEMA_VERSION, TABLES
 from datasets.store.atomic import replace_atomically, write_text
 from datasets.store.card import card
 from datasets.store.digest import table_digest
+from datasets.store.kept_masters import kept_of
 from datasets.store.keys import fault_of_keys, numbers_of, order_of, rows_of
 from datasets.store.known_shards import entries_of
-from datasets.store.linear_images import are_kept
 from datasets.store.manifest import MANIFEST_FILE, manifest_text
 from datasets.store.nulls import with_nulls
 from datasets.store.planned_rows import fault_of_truth
@@ -226,7 +226,7 @@ class Dataset:
         write_text(self.root / MANIFEST_FILE, text)
         frames = sum(entry["rows"] for entry in entries if entry["path"].startswith("frames/"))
         tables = [table for table in TABLES if self.shards(table)]
-        write_text(self.root / CARD_FILE, card(self.recipe, frames, tables, with_masters=are_kept(self.root)))
+        write_text(self.root / CARD_FILE, card(self.recipe, frames, tables, kept_of(self.root)))
 
 
 def open_dataset(root: Path, provenance: Provenance | None = None, *, check: bool = True) -> Dataset:

@@ -1,10 +1,11 @@
-"""Linear images on disk as OpenEXR: which frames have one, what decides it, reading and writing."""
+"""Linear images on disk as OpenEXR: what decides one, reading and writing."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
@@ -12,11 +13,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from datasets.errors import UserError
-from datasets.plan import Frame, plan
+from datasets.plan import Frame
 from datasets.recipe.model import Recipe
 from datasets.recipe.targets import target_values
-from datasets.store.atomic import local_copy, write_text
+from datasets.store.atomic import local_copy, local_file
 from datasets.store.exr_file import DamagedExrError, read_exr, read_header, write_exr
 from eposit import Camera
 from render.frame import LinearImage
@@ -26,11 +26,6 @@ from render.targets.image_region import Region
 
 MASTERS = "masters"  # their folder
 MOST_RADIANCE = 1e12  # of the light that a white board sends back in full: the sun's disc has some 1e5
-NOT_KEPT = "masters-not-kept.txt"  # lies in the folder of a dataset that does not keep them
-NOT_KEPT_TEXT = """\
-This dataset was made with --no-masters: its linear images are rendered, developed and not kept.
-Another regime needs them, and so does `--reuse`: make the dataset in another folder without --no-masters.
-"""
 
 
 class LinearImageError(ValueError):
@@ -69,28 +64,49 @@ def read_linear(path: Path, key: str = "", *, check: bool = True) -> LinearImage
     """
     if not path.is_file():
         raise LinearImageError(f"{path} is missing; run the generate stage again to render it")
+    with _told_of(str(path), path.parent.parent), local_copy(path) as here:
+        return _linear_image(here, key, check=check)
+
+
+def read_linear_bytes(content: bytes, key: str, place: str, root: Path) -> LinearImage:
+    """The linear image in the bytes of an EXR file, compared with its digest and `key`.
+
+    place: where they lie, for messages. root: folder of their dataset.
+
+    Raises:
+        LinearImageError: as `read_linear`.
+    """
+    with _told_of(place, root), local_file(content, ".exr") as here:
+        return _linear_image(here, key, check=True)
+
+
+@contextmanager
+def _told_of(place: str, root: Path) -> Iterator[None]:
+    """Failures of reading as a LinearImageError that names the place of the image."""
     try:
-        with local_copy(path) as here:
-            if read_header(here).get("key") != key:
-                raise ForeignImageError(
-                    f"{path} belongs to another frame or recipe; `repair {path.parent.parent}` puts it aside and "
-                    "renders the right one"
-                )
-            header, channels = read_exr(here, check=check)
-        stored = np.asarray(channels["Y" if "Y" in channels else "RGB"], np.float32)
-        region = _region(header["dataWindow" if "background" in header else "region"])
-        whole, background = _region(header["displayWindow"]), float(header.get("background", 0.0))
-        fault = _fault(stored, region, whole, background)
-        if fault:
-            raise DamagedExrError(fault)
-        if "background" in header:
-            return LinearImage(stored, region, background)
-        return LinearImage(stored[region.pixels], region, stored)
-    except LinearImageError:
-        raise
+        yield
+    except ForeignImageError:
+        text = f"{place} belongs to another frame or recipe; `repair {root}` puts it aside and renders the right one"
+        raise ForeignImageError(text) from None
     except (ValueError, LookupError, TypeError, OSError) as error:
         what = str(error) if isinstance(error, DamagedExrError) else "it cannot be read"
-        raise LinearImageError(f"{path} is damaged: {what}; `repair {path.parent.parent}` renders it again") from error
+        raise LinearImageError(f"{place} is damaged: {what}; `repair {root}` renders it again") from error
+
+
+def _linear_image(path: Path, key: str, *, check: bool) -> LinearImage:
+    """Raises ForeignImageError, without words, where the key is another; else as `read_exr`, or what NumPy raises."""
+    if read_header(path).get("key") != key:
+        raise ForeignImageError
+    header, channels = read_exr(path, check=check)
+    stored = np.asarray(channels["Y" if "Y" in channels else "RGB"], np.float32)
+    region = _region(header["dataWindow" if "background" in header else "region"])
+    whole, background = _region(header["displayWindow"]), float(header.get("background", 0.0))
+    fault = _fault(stored, region, whole, background)
+    if fault:
+        raise DamagedExrError(fault)
+    if "background" in header:
+        return LinearImage(stored, region, background)
+    return LinearImage(stored[region.pixels], region, stored)
 
 
 def _fault(stored: NDArray[np.float32], region: Region, whole: Region, background: float) -> str | None:
@@ -119,45 +135,14 @@ def _region(window: tuple[np.ndarray, np.ndarray]) -> Region:
     return Region.between((int(low[0]), int(low[1])), (int(high[0]) + 1, int(high[1]) + 1))
 
 
-def are_kept(root: Path) -> bool:
-    """Whether a dataset keeps its linear images."""
-    return not (root / NOT_KEPT).exists()
-
-
-def require_kept(root: Path, what: str) -> None:
-    """Refuse a dataset that does not keep its linear images. what: the option or command that needs them.
-
-    Raises:
-        UserError: it was made with --no-masters.
-    """
-    if not are_kept(root):
-        raise UserError(
-            f"{what}: {root} was made with --no-masters and has no linear images; give a dataset that keeps them"
-        )
-
-
-def settle_kept(root: Path, *, keep: bool) -> None:
-    """Note in a dataset's folder that linear images are not kept, unless `keep`; who resumes need not say it again.
-
-    Raises:
-        UserError: the dataset has begun with linear images, or the folder cannot be written.
-    """
-    if keep or not are_kept(root):
-        return
-    if any((root / MASTERS).glob("*.exr")) or any((root / "frames").glob("[!.]*.parquet")):
-        raise UserError(f"{root} keeps its linear images; leave out --no-masters, or choose another --out")
-    write_text(root / NOT_KEPT, NOT_KEPT_TEXT)
-
-
-def masters(root: Path, recipe: Recipe) -> Iterator[tuple[Path, str]]:
-    """Path and key of every frame's linear image."""
-    for frame in plan(recipe):
-        yield root / linear_path(frame.frame_id), linear_key(recipe, frame)
-
-
 def linear_path(frame_id: int) -> str:
     """Path of a frame's linear image in its dataset's folder."""
-    return f"{MASTERS}/{frame_id:06d}.exr"
+    return f"{MASTERS}/{linear_name(frame_id)}"
+
+
+def linear_name(frame_id: int) -> str:
+    """Name of a frame's linear image, as a file or in an archive."""
+    return f"{frame_id:06d}.exr"
 
 
 def linear_key(recipe: Recipe, frame: Frame) -> str:

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import errno
+import itertools
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from datasets.errors import UserError
 from datasets.plan import shard_count, shard_frames
-from datasets.store.atomic import copy_file
+from datasets.store.atomic import copy_file, write_bytes
 from datasets.store.dataset import Dataset, open_dataset
-from datasets.store.linear_images import LinearImageError, are_kept, masters, read_linear, require_kept
+from datasets.store.kept_masters import Kept, kept_of, require_kept
+from datasets.store.linear_images import LinearImageError
+from datasets.store.masters import Master, archive_names, archive_path, master_bytes, masters, read_master
 from datasets.store.refusals import missing, refused
+from datasets.store.zip_archive import DamagedArchiveError, check_layout
 from datasets.url_path import UrlPath
 
 
@@ -28,15 +33,48 @@ def reuse_linear_images(dataset: Dataset, source: Path) -> tuple[int, int]:
     """
     if source.resolve() == dataset.root.resolve():
         raise UserError(f"--reuse {source} is the dataset that is to be made; give the folder of another one")
-    offered = {key: path for path, key in masters(source, source_of(source).recipe)}
-    lacking = [(path, key) for path, key in _wanted(dataset) if not path.is_file()]
-    taken = [(path, offered[key]) for path, key in lacking if key in offered and _is_sound(offered[key], key)]
-    for path, other in taken:
+    offered = {master.key: master for master in masters(source, source_of(source).recipe)}
+    lacking = [master for master in _wanted(dataset) if not master.is_there]
+    found = ((master, offered[master.key]) for master in lacking if master.key in offered)
+    taken = [(master, other) for master, other in found if _is_sound(other)]
+    for _, pairs in itertools.groupby(taken, lambda pair: pair[0].archive):
+        shard = list(pairs)
         try:
-            _link_or_copy(other, path)
+            _take(shard)
         except OSError as error:
-            raise refused(path, error) from error
+            raise refused(shard[0][0].file, error) from error
     return len(taken), len(lacking)
+
+
+def _take(shard: Sequence[tuple[Master, Master]]) -> None:
+    """Link or copy masters of one shard of a dataset, each with its source; as a whole if both have the same archive.
+
+    Raises:
+        OSError: the system refuses.
+    """
+    archives = _same_archives(shard)
+    if archives is not None:
+        _link_or_copy(*archives)
+        return
+    for master, other in shard:
+        if other.file.is_file():
+            _link_or_copy(other.file, master.file)
+        else:
+            write_bytes(master.file, master_bytes(other))
+
+
+def _same_archives(shard: Sequence[tuple[Master, Master]]) -> tuple[Path, Path] | None:
+    """The archive of the sources and of the masters, if all of a shard are taken from one of the same frames."""
+    master, other = shard[0]
+    if master.shard is None or other.shard != master.shard or len(shard) != len(master.shard):
+        return None
+    if any(own.frame_id != its.frame_id or its.file.is_file() for own, its in shard):
+        return None
+    source, path = (each.root / archive_path(master.shard) for each in (other, master))
+    with suppress(DamagedArchiveError):
+        check_layout(source, archive_names(master.shard))
+        return source, path
+    return None
 
 
 def share_pictures(dataset: Dataset, source: Dataset) -> None:
@@ -68,17 +106,17 @@ def source_of(folder: Path) -> Dataset:
     return source
 
 
-def _wanted(dataset: Dataset) -> Iterator[tuple[Path, str]]:
-    """Path and key of the linear images that a dataset needs: all, or if none is kept those still to be developed."""
-    kept, size, count = are_kept(dataset.root), shard_frames(dataset.recipe), shard_count(dataset.recipe)
-    for i, (path, key) in enumerate(masters(dataset.root, dataset.recipe)):
-        if kept or not dataset.is_done(dataset.shard_path("frames", i // size, count)):
-            yield path, key
+def _wanted(dataset: Dataset) -> Iterator[Master]:
+    """The linear images that a dataset needs: all, or if none is kept those still to be developed."""
+    kept, size, count = kept_of(dataset.root), shard_frames(dataset.recipe), shard_count(dataset.recipe)
+    for i, master in enumerate(masters(dataset.root, dataset.recipe)):
+        if kept is not Kept.NOT or not dataset.is_done(dataset.shard_path("frames", i // size, count)):
+            yield master
 
 
-def _is_sound(path: Path, key: str) -> bool:
+def _is_sound(master: Master) -> bool:
     try:
-        read_linear(path, key)
+        read_master(master)
     except LinearImageError:
         return False
     return True

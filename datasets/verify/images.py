@@ -10,38 +10,33 @@ from datasets.plan import frame_count, plan
 from datasets.store.baked_light import FILE, FOLDER, light_key
 from datasets.store.dataset import Dataset
 from datasets.store.exr_file import DamagedExrError, Header, read_exr
-from datasets.store.linear_images import (
-    MASTERS,
-    ForeignImageError,
-    LinearImageError,
-    are_kept,
-    linear_path,
-    masters,
-    read_linear,
-)
+from datasets.store.kept_masters import Kept, kept_of
+from datasets.store.linear_images import MASTERS, linear_path
+from datasets.store.masters import masters
 from datasets.store.pixel_truth import TRUTH, truth_path
+from datasets.verify.archives import archive_problems, single_file_problem, unplanned_archives
 from datasets.verify.problems import Kind, Problem, damaged_file, missing_file, unplanned_file
 
 
 def image_problems(dataset: Dataset) -> Iterator[Problem]:
     """What is wrong with the OpenEXR files of a dataset."""
-    if are_kept(dataset.root):
+    kept = kept_of(dataset.root)
+    if kept is Kept.FILES:
         yield from _masters(dataset)
+    if kept is Kept.ARCHIVES:
+        yield from archive_problems(dataset)
     if dataset.recipe.outputs.aovs:
         yield from _truth(dataset)
     yield from _light(dataset)
     yield from _unplanned(dataset)
+    yield from unplanned_archives(dataset, kept)
 
 
 def _masters(dataset: Dataset) -> Iterator[Problem]:
-    for path, key in masters(dataset.root, dataset.recipe):
-        if not path.is_file():
-            yield missing_file(path)
-            continue
-        try:
-            read_linear(path, key)
-        except LinearImageError as error:
-            yield Problem(path, Kind.FOREIGN if isinstance(error, ForeignImageError) else Kind.DAMAGED, str(error))
+    for master in masters(dataset.root, dataset.recipe):
+        problem = single_file_problem(master) if master.file.is_file() else missing_file(master.file)
+        if problem is not None:
+            yield problem
 
 
 def _truth(dataset: Dataset) -> Iterator[Problem]:

@@ -14,6 +14,7 @@ from pipelines.endings import UnfinishedError, own_command
 if TYPE_CHECKING:
     from datasets.recipe.model import Recipe
     from datasets.store.dataset import Dataset
+    from datasets.store.kept_masters import Kept
     from pipelines.stages.missing import Execution
 
 
@@ -33,21 +34,37 @@ def load(recipe: str, regime: str | None) -> tuple[Recipe, str]:
     return parse_recipe(text, f"recipe {recipe} with --regime {regime}"), text
 
 
+def kept_by(no_masters: bool, pack_masters: bool) -> Kept:
+    """How options say that linear images are kept.
+
+    Raises:
+        UserError: they exclude each other.
+    """
+    from datasets.errors import UserError
+    from datasets.store.kept_masters import Kept
+
+    if no_masters and pack_masters:
+        raise UserError("--no-masters and --pack-masters exclude each other; leave out one of them")
+    if pack_masters:
+        return Kept.ARCHIVES
+    return Kept.NOT if no_masters else Kept.FILES
+
+
 @contextmanager
 def begin(
-    loaded: tuple[Recipe, str], out: Path, reuse: Path | None, execution: Execution, *, keep_masters: bool = True
+    loaded: tuple[Recipe, str], out: Path, reuse: Path | None, execution: Execution, kept: Kept
 ) -> Iterator[Dataset]:
     """The dataset of a recipe, begun or resumed in `out`, with linear light from `reuse` where it fits.
 
     Nobody else writes it while the body runs, but others that share it, with the same recipe. loaded: the recipe and
-    its text. keep_masters: as for `claim`.
+    its text. kept: as for `claim`.
 
     Raises:
         UserError: a folder or plan that is not usable, or another process writes the folder.
     """
     from datasets.plan import plan
     from datasets.store.claim import claim
-    from datasets.store.linear_images import are_kept
+    from datasets.store.kept_masters import OPTIONS, Kept, kept_of
     from datasets.store.reuse import reuse_linear_images, source_of
     from pipelines.machine import provenance
 
@@ -56,9 +73,11 @@ def begin(
     plan(recipe)
     if reuse is not None:
         source_of(reuse)  # before anything is written
-    with claim(out, recipe, text, shared=shared, provenance=provenance(), keep_masters=keep_masters) as dataset:
-        if keep_masters and not are_kept(out):
-            console.print("linear images are not kept, as this dataset was begun with --no-masters")
+    with claim(out, recipe, text, shared=shared, provenance=provenance(), kept=kept) as dataset:
+        begun = kept_of(out)
+        if kept is Kept.FILES and begun in OPTIONS:
+            told = f"linear images are {begun.value}, as this dataset was begun with {OPTIONS[begun]}"
+            console.print(told, soft_wrap=True)
         if reuse is not None:
             taken, lacking = reuse_linear_images(dataset, reuse)
             console.print(f"linear images: {taken} of {lacking} taken from {reuse}; the rest is rendered")

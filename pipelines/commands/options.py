@@ -73,6 +73,10 @@ NoMasters = Annotated[
     bool,
     typer.Option("--no-masters", help="Do not keep linear light, nine tenths of the bytes: nothing to reuse."),
 ]
+PackMasters = Annotated[
+    bool,
+    typer.Option("--pack-masters", help="Keep linear light in one ZIP archive for each shard, not in a file a frame."),
+]
 
 Url = Annotated[
     str, typer.Argument(metavar="URL", help="s3://bucket/folder, gs://bucket/folder or file:///folder, with options.")

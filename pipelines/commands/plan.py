@@ -24,6 +24,7 @@ def plan(
     frames: o.Frames = None,
     workers: o.Workers = 1,
     no_masters: o.NoMasters = False,
+    pack_masters: o.PackMasters = False,
     measure: o.Measure = False,
     json: o.Json = False,
 ) -> None:
@@ -33,15 +34,16 @@ def plan(
     """
     from datasets.plan import frame_count
     from datasets.recipe.model import load_recipe
+    from pipelines.commands.opening import kept_by
     from pipelines.cost.choice import forecast_of
 
-    loaded = load_recipe(recipe)[0]
+    kept, loaded = kept_by(no_masters, pack_masters), load_recipe(recipe)[0]
     if not 1 <= workers <= MOST_WORKERS:
         raise UserError(f"{workers} workers are not usable; give --workers from 1 to {MOST_WORKERS}")
     count = frame_count(loaded) if frames is None else _count(frames)
     if measure:
         _measure(loaded)
-    found = forecast_of(loaded, frames=count, workers=workers, with_masters=not no_masters)
+    found = forecast_of(loaded, frames=count, workers=workers, kept=kept)
     if json:
         print_json(_as_json(loaded, found))
     else:
@@ -91,6 +93,7 @@ def _as_json(recipe: Recipe, found: Forecast) -> dict[str, object]:
 
 
 def _print(recipe: Recipe, found: Forecast) -> None:
+    from datasets.store.kept_masters import Kept
     from pipelines.cost.forecast import lasting, sized
 
     frames = found.frames
@@ -107,6 +110,7 @@ def _print(recipe: Recipe, found: Forecast) -> None:
     if found.shards > MANY_SHARDS and found.shard_frames < USUAL_SHARD_FRAMES:
         fewer = -(-frames // USUAL_SHARD_FRAMES)
         typer.echo(f"shard_frames = {USUAL_SHARD_FRAMES} in the recipe would make {fewer} shards")
-    if found.bytes.get("masters") and frames > MANY_FILES:
-        typer.echo("each frame's linear image is a file of its own, in one folder; --no-masters leaves them out")
+    if found.bytes.get("masters") and found.kept is Kept.FILES and frames > MANY_FILES:
+        told = "--pack-masters puts those of a shard in one, --no-masters leaves them out"
+        typer.echo(f"each frame's linear image is a file of its own, in one folder; {told}")
     typer.echo(f"from {found.source}")

@@ -10,7 +10,7 @@ from rich.console import Console
 
 from datasets.errors import UserError
 from pipelines.commands import options as o
-from pipelines.commands.opening import begin, complete_manifest, finish, load, opened, writing
+from pipelines.commands.opening import begin, complete_manifest, finish, kept_by, load, opened, writing
 from pipelines.engines.choice import engine_of
 from pipelines.stages.part import part_of
 
@@ -27,6 +27,7 @@ def run(
     regime: o.Regime = None,
     reuse: o.Reuse = None,
     no_masters: o.NoMasters = False,
+    pack_masters: o.PackMasters = False,
     ignore_disk: o.IgnoreDisk = False,
     solver: o.MoreSolvers = None,
     estimator: o.MoreEstimators = None,
@@ -52,9 +53,9 @@ def run(
         solver_of(name, limit_s=timeout)  # what cannot be called is told before anything is rendered
     for name in systems:
         estimator_of(name, timeout)
-    loaded = load(recipe, regime)
-    tell_cost(loaded[0], out, execution, Start(workers, ALL_STAGES, not no_masters, ignore_disk))
-    with begin(loaded, out, reuse, execution, keep_masters=not no_masters) as dataset:
+    kept, loaded = kept_by(no_masters, pack_masters), load(recipe, regime)
+    tell_cost(loaded[0], out, execution, Start(workers, ALL_STAGES, kept, ignore_disk))
+    with begin(loaded, out, reuse, execution, kept) as dataset:
         with compiled_ahead(dataset, execution.part) as kernels:  # beside the first pictures
             stages.run_generate(dataset, execution)
             stages.run_detect(dataset, execution, kernels=kernels)
@@ -95,6 +96,7 @@ def generate(
     regime: o.Regime = None,
     reuse: o.Reuse = None,
     no_masters: o.NoMasters = False,
+    pack_masters: o.PackMasters = False,
     ignore_disk: o.IgnoreDisk = False,
     workers: o.Workers = 1,
     engine: o.EngineName = "local",
@@ -107,9 +109,9 @@ def generate(
     from pipelines.stages import run as stages
 
     execution = _execution(engine, workers, ray_address, shard, quiet)
-    loaded = load(recipe, regime)
-    tell_cost(loaded[0], out, execution, Start(workers, ("generate",), not no_masters, ignore_disk))
-    with begin(loaded, out, reuse, execution, keep_masters=not no_masters) as dataset:
+    kept, loaded = kept_by(no_masters, pack_masters), load(recipe, regime)
+    tell_cost(loaded[0], out, execution, Start(workers, ("generate",), kept, ignore_disk))
+    with begin(loaded, out, reuse, execution, kept) as dataset:
         stages.run_generate(dataset, execution)
         finish(execution)
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from datasets.errors import UserError
 from datasets.plan import frame_count
 from datasets.recipe.model import Recipe
+from datasets.store.kept_masters import Kept, kept_of
 from datasets.store.refusals import SHARD_NAME
 from datasets.url_path import UrlPath
 from pipelines.cost.choice import forecast_of
@@ -26,7 +27,7 @@ class Start:
 
     workers: int
     stages: tuple[str, ...]  # of `ALL_STAGES`
-    with_masters: bool
+    kept: Kept  # how linear images are to be kept
     ignore_disk: bool = False
 
 
@@ -45,7 +46,8 @@ def tell_cost(recipe: Recipe, out: Path, execution: Execution, start: Start) -> 
         UserError: the disk cannot hold it, unless `start.ignore_disk`.
     """
     workers = start.workers * execution.part.count
-    found = forecast_of(recipe, frames=frame_count(recipe), workers=workers, with_masters=start.with_masters)
+    kept = kept_of(out) if start.kept is Kept.FILES else start.kept
+    found = forecast_of(recipe, frames=frame_count(recipe), workers=workers, kept=kept)
     begun = _begun(out, found.shard_frames)
     left = max(0.0, 1.0 - begun.shards / found.shards)
     if not left:
@@ -57,11 +59,11 @@ def tell_cost(recipe: Recipe, out: Path, execution: Execution, start: Start) -> 
     size = f"{sized(wanted)} of the {sized(free)} that are free" if free is not None else f"{sized(wanted)} to put"
     execution.console.print(f"{told}: about {time} with {people}, {size} (from {found.source})", soft_wrap=True)
     if free is not None and wanted * (1.0 + MARGIN) > free and not start.ignore_disk:
-        raise _too_small(out, wanted, free, with_masters=start.with_masters)
+        raise _too_small(out, wanted, free, kept)
 
 
-def _too_small(out: Path, wanted: float, free: int, *, with_masters: bool) -> UserError:
-    leaner = ", leave out the linear images with --no-masters" if with_masters else ""
+def _too_small(out: Path, wanted: float, free: int, kept: Kept) -> UserError:
+    leaner = "" if kept is Kept.NOT else ", leave out the linear images with --no-masters"
     return UserError(
         f"{out} needs about {sized(wanted)} more, {sized(wanted * (1.0 + MARGIN))} with a margin of {MARGIN:.0%}, and "
         f"its disk has {sized(free)} free; free space, choose another --out{leaner}, or go on with --ignore-disk"
@@ -84,7 +86,13 @@ def _bytes_left(found: Forecast, begun: Begun, left: float, stages: tuple[str, .
     sizes = dict(kinds)
     if begun.frame_bytes is not None:
         sizes["frames"] = begun.frame_bytes * found.frames
-    return left * sum(sizes.values())
+    return left * sum(sizes.values()) + _bytes_of_packing(found)
+
+
+def _bytes_of_packing(found: Forecast) -> float:
+    """Of the linear images that are there twice for a moment: those of the shards that workers pack at once."""
+    at_once = min(found.shards, found.workers) * found.shard_frames / found.frames
+    return min(1.0, at_once) * found.bytes["masters"] if found.kept is Kept.ARCHIVES else 0.0
 
 
 def _begun(out: Path, size: int) -> Begun:

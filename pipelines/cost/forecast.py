@@ -7,9 +7,11 @@ from dataclasses import dataclass
 
 from datasets.plan.shards import shard_size
 from datasets.recipe.model import Recipe
+from datasets.store.kept_masters import Kept
 from pipelines.cost.figures import Figures
 
 HELD_TIMES = 4.0  # a shard's rows are held as Python's objects, as a table, and as the file that is written
+ENTRY_BYTES = 96  # of a frame in an archive beside its linear image: a header, an entry of the directory, two names
 MOST_FRAMES = 1_000_000_000_000
 
 
@@ -26,6 +28,7 @@ class Forecast:
     worker_mb: float
     workers: int
     source: str  # of the figures
+    kept: Kept  # how linear images are
 
     @property
     def seconds(self) -> float:
@@ -38,24 +41,31 @@ class Forecast:
         return sum(self.bytes.values())
 
 
-def forecast(recipe: Recipe, figures: Figures, *, frames: int, workers: int, with_masters: bool) -> Forecast:
-    """What `frames` frames like the recipe's take."""
+def forecast(recipe: Recipe, figures: Figures, *, frames: int, workers: int, kept: Kept) -> Forecast:
+    """What `frames` frames like the recipe's take. kept: how linear images are."""
     size = shard_size(recipe, frames)
     shards = -(-frames // size)
-    each = {folder: value for folder, value in figures.frame_bytes.items() if with_masters or folder != "masters"}
-    images = sum(1 for folder in ("masters", "truth") if each.get(folder))
+    each = {
+        folder: value for folder, value in figures.frame_bytes.items() if kept is not Kept.NOT or folder != "masters"
+    }
+    alone = [folder for folder in ("masters", "truth") if each.get(folder)]
+    archives = shards if kept is Kept.ARCHIVES and "masters" in alone else 0
+    singles = frames * (len(alone) - (1 if archives else 0))
     sizes = {folder: value * frames for folder, value in each.items()} | {"footers": figures.shard_bytes * shards}
+    if archives:
+        sizes["masters"] += ENTRY_BYTES * frames
     rows = sum(value for folder, value in each.items() if folder not in ("masters", "truth"))
     return Forecast(
         frames=frames,
         shards=shards,
         shard_frames=size,
-        files=shards * figures.shard_files + images * frames,
+        files=shards * figures.shard_files + archives + singles,
         bytes=sizes,
         stage_seconds={stage: spent * frames / workers for stage, spent in figures.seconds.items()},
         worker_mb=figures.worker_mb + HELD_TIMES * min(size, frames) * rows / 2**20,
         workers=workers,
         source=figures.source,
+        kept=kept,
     )
 
 

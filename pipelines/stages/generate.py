@@ -19,7 +19,10 @@ from datasets.schema import FRAMES, KEYPOINTS, MOTION_COLUMNS, WORLD_PREFIX
 from datasets.store.baked_light import light_of
 from datasets.store.dataset import Dataset
 from datasets.store.images import encode_png
-from datasets.store.linear_images import LinearImageError, are_kept, linear_key, linear_path, read_linear, write_linear
+from datasets.store.kept_masters import Kept, kept_of
+from datasets.store.linear_images import MASTERS, LinearImageError, linear_path, write_linear
+from datasets.store.masters import Master, archive_path, master_of, read_master
+from datasets.store.packing import drop_packed_files, pack_masters
 from datasets.store.pixel_truth import truth_path, write_truth
 from datasets.store.refusals import refused
 from eposit import Pose
@@ -42,14 +45,29 @@ def is_done(dataset: Dataset, index: int) -> bool:
     count = shard_count(dataset.recipe)
     if not all(dataset.is_done(dataset.shard_path(name, index, count)) for name in ("frames", "keypoints")):
         return False
-    files = [linear_path] if are_kept(dataset.root) else []
+    kept, chosen = kept_of(dataset.root), frame_ids_of_shard(dataset.recipe, index)
+    if kept is Kept.ARCHIVES and not (dataset.root / archive_path(chosen)).is_file():
+        return False
+    files = [linear_path] if kept is Kept.FILES else []
     files += [truth_path] if dataset.recipe.outputs.aovs else []
-    chosen = frame_ids_of_shard(dataset.recipe, index)
     return all((dataset.root / path_of(frame_id)).is_file() for path_of in files for frame_id in chosen)
 
 
+def finish_packing(dataset: Dataset) -> None:
+    """Remove what a run that was stopped while it packed has left of single linear images.
+
+    Raises:
+        UserError: the disk or its permissions refuse.
+    """
+    if kept_of(dataset.root) is Kept.ARCHIVES:
+        try:
+            drop_packed_files(dataset.root, dataset.recipe)
+        except OSError as error:
+            raise refused(dataset.root / MASTERS, error) from error
+
+
 def run_shard(dataset: Dataset, index: int, advance: Callable[[], None] = lambda: None) -> None:
-    """Make one shard of `frames` and `keypoints` and its masters, which are removed again if they are not kept.
+    """Make one shard of `frames` and `keypoints` and its masters, which are packed, or removed if they are not kept.
 
     What is there of them stays.
 
@@ -58,26 +76,38 @@ def run_shard(dataset: Dataset, index: int, advance: Callable[[], None] = lambda
     recipe = dataset.recipe
     count, chosen = shard_count(recipe), frames_of_shard(recipe, index)
     visible: list[Mask | None] = []
-    rows = list(overlapped(_makers(dataset, chosen, visible), advance))
+    kept = kept_of(dataset.root)
+    rows = list(overlapped(_makers(dataset, chosen, visible, kept), advance))
+    if kept is Kept.ARCHIVES:
+        _pack(dataset, frame_ids_of_shard(recipe, index))
     truth = pa.concat_tables(_keypoints(recipe, frame, seen) for frame, seen in zip(chosen, visible, strict=True))
     for name, made in (("keypoints", truth), ("frames", pa.Table.from_pylist(rows, schema=FRAMES))):
         path = dataset.shard_path(name, index, count)
         if not dataset.is_done(path):
             dataset.write_shard(path, made)
-    if not are_kept(dataset.root):
+    if kept is Kept.NOT:
         for frame in chosen:  # of another dataset, put there by `--reuse`
             (dataset.root / linear_path(frame.frame_id)).unlink(missing_ok=True)
 
 
+def _pack(dataset: Dataset, shard: range) -> None:
+    try:
+        pack_masters(dataset.root, shard)
+    except OSError as error:
+        raise refused(dataset.root / archive_path(shard), error) from error
+
+
 def _makers(
-    dataset: Dataset, chosen: Iterable[Frame], visible: list[Mask | None]
+    dataset: Dataset, chosen: Iterable[Frame], visible: list[Mask | None], kept: Kept
 ) -> Iterator[Callable[[], dict[str, object]]]:
     """What finishes each frame once its rays are traced. visible: gets which of each frame's points are."""
     for frame in chosen:
-        light, is_new = _light(dataset, frame)
+        master = master_of(dataset.root, dataset.recipe, frame, kept)
+        light, is_new = _light(dataset, frame, master)
         traced = _traced(dataset.recipe, frame)
         visible.append(traced.visible)
-        yield functools.partial(_finish, dataset, frame, light, is_new, traced.pixels)
+        new = master if is_new and kept is not Kept.NOT else None
+        yield functools.partial(_finish, dataset, frame, light, new, traced.pixels)
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,10 +130,10 @@ def _traced(recipe: Recipe, frame: Frame) -> _Traced:
     return _Traced(found.visible() if is_world else None, found.pixels() if recipe.outputs.aovs else None)
 
 
-def _light(dataset: Dataset, frame: Frame) -> tuple[LinearImage, bool]:
+def _light(dataset: Dataset, frame: Frame, master: Master) -> tuple[LinearImage, bool]:
     """The frame's linear light, and whether it is new: read if it is there and made from the same things."""
     try:
-        return read_linear(dataset.root / linear_path(frame.frame_id), linear_key(dataset.recipe, frame)), False
+        return read_master(master), False
     except LinearImageError:
         return _rendered(dataset.recipe, frame, dataset.root), True
 
@@ -114,7 +144,7 @@ def linear_light(dataset: Dataset, frame: Frame) -> LinearImage:
     Raises:
         UserError: it cannot be rendered.
     """
-    return _light(dataset, frame)[0]
+    return _light(dataset, frame, master_of(dataset.root, dataset.recipe, frame, kept_of(dataset.root)))[0]
 
 
 def _rendered(recipe: Recipe, frame: Frame, root: Path | None = None) -> LinearImage:
@@ -154,14 +184,17 @@ def picture(recipe: Recipe, frame: Frame) -> NDArray[np.uint8]:
 
 
 def _finish(
-    dataset: Dataset, frame: Frame, linear: LinearImage, is_new: bool, truth: PixelTruth | None
+    dataset: Dataset, frame: Frame, linear: LinearImage, new: Master | None, truth: PixelTruth | None
 ) -> dict[str, object]:
-    """Write the linear image if it is new and the truth if there is any, develop, and make the frame's row."""
+    """Write the linear image and the truth if there are any, develop, and make the frame's row.
+
+    new: where the linear image is to be kept; None if it is there already, or none is kept.
+    """
     recipe, spec = dataset.recipe, frame.camera
     path = dataset.root / linear_path(frame.frame_id)
     try:
-        if is_new and are_kept(dataset.root):
-            write_linear(linear, spec.true_camera(), path, linear_key(recipe, frame))
+        if new is not None:
+            write_linear(linear, spec.true_camera(), path, new.key)
         if truth is not None:
             path = dataset.root / truth_path(frame.frame_id)
             if not path.is_file():

@@ -10,8 +10,10 @@ from pathlib import Path
 from datasets.errors import UserError
 from datasets.schema import TABLES
 from datasets.store.dataset import Dataset
+from datasets.store.linear_images import MASTERS
+from datasets.store.packing import unpack_sound
 from datasets.store.quarantine import put_aside
-from datasets.store.refusals import SHARD_NAME
+from datasets.store.refusals import SHARD_NAME, refused
 from datasets.verify import verify
 from datasets.verify.problems import Kind, Problem
 from pipelines.detection import Detector
@@ -42,6 +44,9 @@ def repair(dataset: Dataset, execution: Execution) -> tuple[list[Path], list[Pro
     wanted = [_made_by(item.path) for item in problems if item.kind in (Kind.DAMAGED, Kind.FOREIGN, Kind.MISSING)]
     for variant in _variants(wanted, "estimates"):
         answers_of(variant)  # before anything is moved
+    for item in problems:
+        if item.kind in (Kind.DAMAGED, Kind.FOREIGN) and _is_archive(item.path):
+            _unpack(dataset, item.path)
     aside = [put_aside(dataset.root, item.path) for item in problems if item.kind in ASIDE and item.path.is_file()]
     # The manifest is written once at the end: until then it names what is still to be made.
     _make(dataset, [path for path in wanted if path is not None], dataclasses.replace(execution, lists=False))
@@ -100,7 +105,19 @@ def _made_by(path: Path) -> tuple[str, str, Path] | None:
     table, shard = path.parent.name, SHARD_NAME.fullmatch(path.name)
     if table in TABLES and shard:
         return table, shard[1], path
-    return ("frames", "frames", path) if path.suffix == ".exr" else None
+    return ("frames", "frames", path) if path.suffix == ".exr" or _is_archive(path) else None
+
+
+def _is_archive(path: Path) -> bool:
+    return path.parent.name == MASTERS and path.suffix == ".zip"
+
+
+def _unpack(dataset: Dataset, archive: Path) -> None:
+    """Keep what is sound in a damaged archive, from which the next one is made."""
+    try:
+        unpack_sound(dataset.root, dataset.recipe, archive)
+    except OSError as error:
+        raise refused(archive, error) from error
 
 
 def _variants(wanted: Iterable[tuple[str, str, Path] | None], table: str) -> list[str]:

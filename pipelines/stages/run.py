@@ -27,6 +27,7 @@ MAKE_AGAIN = "; --overwrite makes them again"
 
 def run_generate(dataset: Dataset, execution: Execution) -> None:
     """Render what is missing."""
+    generate.finish_packing(dataset)
     stage = Stage("generate", generate.is_done, generate.run_shard, by_frame=True)
     run_missing(stage, dataset, _indices(dataset, execution), execution)
 

@@ -23,6 +23,7 @@ from datasets.store.dataset import open_dataset
 from datasets.store.exr_file import DamagedExrError, read_exr, write_exr
 from datasets.store.images import decode_pixels, encode_png
 from datasets.store.linear_images import LinearImageError, read_linear
+from datasets.store.zip_archive import DamagedArchiveError, check_layout, read_member, write_archive
 from pipelines.stages.import_poses import read_poses
 from tests.conftest import TINY
 from tests.wrong_input import first
@@ -150,6 +151,18 @@ def test_linear_images(effort, tmp_path):
         read_linear(path, "k")
 
     fuzz(_edits(path.read_bytes()), read, (DamagedExrError, LinearImageError, OSError), *effort)
+
+
+def test_archives(effort, tmp_path):
+    path, names = tmp_path / "a.zip", ["000000.exr", "000001.exr"]
+    write_archive(path, names, [b"one", b"other"])
+
+    def read(data):
+        path.write_bytes(data)
+        check_layout(path, names)
+        assert [read_member(path, names, number) for number in range(2)] == [b"one", b"other"]
+
+    fuzz(_edits(path.read_bytes()), read, DamagedArchiveError, *effort)
 
 
 @pytest.mark.parametrize("table", ["frames", "detections", "scores"])

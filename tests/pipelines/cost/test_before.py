@@ -49,5 +49,19 @@ def test_what_is_there_needs_no_room(place, cli, free):
     assert "1 of 2 frames to make" in cli("generate", recipe, "--out", root).out
 
 
+def test_what_is_packed_needs_room_twice_for_a_moment(place, cli, free):
+    """Two shards: with one worker one of them is there as single files and as an archive."""
+
+    def wanted(*options):
+        free(0)
+        done = cli("generate", place.recipe(place.text), "--out", place.new(), "-q", *options)
+        assert done.code == 2
+        return re.search(r"needs about (\d+) (kB|MB)", done.err)
+
+    single, packed = wanted(), wanted("--pack-masters")
+    assert (single[2], packed[2]) == ("kB", "kB")
+    assert 1.3 < int(packed[1]) / int(single[1]) < 1.5  # linear images are nine tenths
+
+
 def test_free_space_is_that_of_the_nearest_folder_that_is_there(tmp_path):
     assert before.free_bytes(tmp_path / "a" / "b") > 0

@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from datasets.recipe.model import load_recipe, parse_recipe, recipe_names
-from pipelines.cost import figures as kept
+from datasets.store.kept_masters import Kept
+from pipelines.cost import figures as measured
 from pipelines.cost.choice import forecast_of
 from pipelines.cost.figures import IMAGES, TABLES_OF_RUN, Figures
 from pipelines.cost.forecast import forecast, lasting, sized
@@ -34,20 +35,23 @@ RECIPE = parse_recipe(TINY.replace("shard_frames = 1\n", ""), "test")
 @pytest.fixture
 def own_cache(tmp_path, monkeypatch):
     """An empty folder for figures."""
-    monkeypatch.setattr(kept, "folders", lambda: [tmp_path / "cache"])
+    monkeypatch.setattr(measured, "folders", lambda: [tmp_path / "cache"])
     return tmp_path / "cache"
 
 
 def test_costs_grow_with_frames_and_are_shared_by_workers():
-    found = forecast(RECIPE, FIGURES, frames=10**9, workers=100, with_masters=True)
+    found = forecast(RECIPE, FIGURES, frames=10**9, workers=100, kept=Kept.FILES)
     assert (found.shards, found.shard_frames) == (10**6, 1000)
     assert found.seconds == pytest.approx(4.0 * 10**9 / 100)
     assert found.total_bytes == pytest.approx(4800.0 * 10**9 + 1000.0 * 10**6)
     assert found.files == 13 * 10**6 + 10**9
-    lean = forecast(RECIPE, FIGURES, frames=10**9, workers=100, with_masters=False)
+    lean = forecast(RECIPE, FIGURES, frames=10**9, workers=100, kept=Kept.NOT)
     assert lean.total_bytes == pytest.approx(800.0 * 10**9 + 1000.0 * 10**6)
     assert lean.files == 13 * 10**6
-    few = forecast(RECIPE, FIGURES, frames=12, workers=1, with_masters=True)
+    packed = forecast(RECIPE, FIGURES, frames=10**9, workers=100, kept=Kept.ARCHIVES)
+    assert packed.files == 14 * 10**6
+    assert packed.total_bytes == pytest.approx(found.total_bytes + 96.0 * 10**9)
+    few = forecast(RECIPE, FIGURES, frames=12, workers=1, kept=Kept.FILES)
     assert (few.shards, few.shard_frames) == (2, 10)
     # A shard of a thousand times 800 bytes is held four times.
     assert found.worker_mb - FIGURES.worker_mb == pytest.approx(4.0 * 1000 * 800 / 2**20)
@@ -66,12 +70,12 @@ def test_every_recipe_has_figures_of_another_machine(name):
 
 def test_figures_of_this_machine_come_first_and_are_those_of_such_frames(own_cache):
     def source(recipe):
-        return forecast_of(recipe, frames=10, workers=1, with_masters=True).source
+        return forecast_of(recipe, frames=10, workers=1, kept=Kept.FILES).source
 
     assert "another machine" in source(RECIPE)
-    path = kept.keep_figures(RECIPE, FIGURES)
+    path = measured.keep_figures(RECIPE, FIGURES)
     assert path.parent == own_cache
-    assert kept.read_figures(RECIPE) == FIGURES
+    assert measured.read_figures(RECIPE) == FIGURES
     longer = parse_recipe(TINY.replace("stop = 90", "stop = 9000").replace("seed = 5", "seed = 6"), "test")
     assert source(longer) == "a test"
     larger = parse_recipe(TINY.replace("width = 400", "width = 500"), "test")

@@ -19,6 +19,7 @@ from datasets.plan import shard_count
 from datasets.recipe.model import parse_recipe
 from datasets.store.atomic import write_text
 from datasets.store.claim import claim
+from datasets.store.kept_masters import Kept
 from datasets.verify import verify
 from pipelines.bench.memory import resident_mb
 from pipelines.machine import processor
@@ -122,7 +123,7 @@ def test_memory_stays_and_the_last_thousand_frames_are_as_fast_as_the_first(tmp_
 def made(root, text, execution):
     """A dataset after every stage but the report."""
     recipe = parse_recipe(text, "test")
-    with claim(root, recipe, text, keep_masters=False) as dataset:
+    with claim(root, recipe, text, kept=Kept.NOT) as dataset:
         stages.run_generate(dataset, execution)
         stages.run_detect(dataset, execution)
         stages.run_estimate(dataset, run_settings(recipe.target), execution)

@@ -198,10 +198,11 @@ def test_a_wrong_bucket_and_no_access_are_told(root, tiny, tmp_path, environment
 @pytest.mark.full
 @pytest.mark.usefixtures("environment")
 @pytest.mark.parametrize("files", [1, 3, 5, 7])
-def test_a_run_that_is_killed_while_it_puts_goes_on(files, tiny, tmp_path, content, server):
-    recipe, place = tmp_path / "tiny.toml", dataset_folder(f"s3://bucket/killed{files}/demo")
+@pytest.mark.parametrize("options", [(), ("--pack-masters",)], ids=["single", "packed"])
+def test_a_run_that_is_killed_while_it_puts_goes_on(options, files, tiny, tmp_path, content, server):
+    recipe, place = tmp_path / "tiny.toml", dataset_folder(f"s3://bucket/killed{files}{len(options)}/demo")
     recipe.write_text(tiny[0])
-    words = ["generate", recipe, "--out", place, "--workers", 2, "-q"]
+    words = ["generate", recipe, "--out", place, "--workers", 2, "-q", *options]
     running = subprocess.Popen([sys.executable, "-m", "pipelines", *map(str, words)], start_new_session=True)
     deadline = time.monotonic() + PATIENCE_S
     while len(place.sizes()) < files and running.poll() is None and time.monotonic() < deadline:
@@ -212,5 +213,7 @@ def test_a_run_that_is_killed_while_it_puts_goes_on(files, tiny, tmp_path, conte
     assert {problem.kind for problem in problems} <= {"missing"}
     assert pipelines(*words) == (0, "")
     kept = tmp_path / "kept"
-    assert pipelines("generate", recipe, "--out", kept, "-q") == (0, "")
+    assert pipelines("generate", recipe, "--out", kept, "-q", *options) == (0, "")
     assert content(place) == content(kept)
+    linear = [{path.name: path.read_bytes() for path in (root / "masters").glob("*")} for root in (place, kept)]
+    assert linear[0] == linear[1]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from datasets.store.dataset import open_dataset
-from datasets.store.linear_images import NOT_KEPT
+from datasets.store.kept_masters import NOT_KEPT
 from tests.wrong_input import assert_one_sentence, files, first
 
 
@@ -80,7 +80,9 @@ def test_what_is_kept_stays_kept(place, cli):
     recipe, root = place.recipe(), place.dataset()
     before = files(root)
     done = cli("generate", recipe, "--out", root, "--no-masters")
-    assert_one_sentence(done.code, done.err, "keeps its linear images; leave out --no-masters, or choose another --out")
+    assert_one_sentence(
+        done.code, done.err, "keeps its linear images as single files; leave out --no-masters, or choose another --out"
+    )
     assert before.items() <= files(root).items()
     assert not (root / NOT_KEPT).exists()
 
