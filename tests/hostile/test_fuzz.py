@@ -116,7 +116,7 @@ def fuzz(strategy, read, errors, examples, seconds):
 
 
 @pytest.fixture(
-    params=[pytest.param((FEW, 0.0), id="few"), pytest.param((2000, SECONDS), id="long", marks=pytest.mark.slow)]
+    params=[pytest.param((FEW, 0.0), id="few"), pytest.param((500, SECONDS), id="long", marks=pytest.mark.slow)]
 )
 def effort(request):
     return request.param
