@@ -183,6 +183,8 @@ def _is_status(value: Any) -> bool:
 
 def _numbers(value: Any, shape: tuple[int, ...], what: str) -> Array:
     try:
+        if np.iscomplexobj(value):
+            raise TypeError  # their real parts are no answer
         array = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
         raise UserError(f"{what} as {_kind(value)}; it must be numbers of shape {shape}") from None

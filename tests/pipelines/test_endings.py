@@ -84,6 +84,34 @@ def test_a_signal_at_any_moment_is_one_sentence_and_loses_nothing(number, moment
     assert left_behind(root) == []
 
 
+IN_A_DESTRUCTOR = """
+import os, signal, sys, time
+from pipelines.endings import Stopped, listen, say_stopped
+
+class Dying:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGTERM)
+        for _ in range(1000):
+            pass
+
+listen()
+try:
+    Dying()
+    time.sleep(60)
+except Stopped as stop:
+    print("unwound")
+    sys.exit(say_stopped(stop.number))
+"""
+
+
+def test_a_signal_in_a_destructor_which_can_raise_nothing_is_one_sentence(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-c", IN_A_DESTRUCTOR], cwd=ROOT, capture_output=True, text=True, timeout=PATIENCE_S
+    )
+    assert (done.returncode, done.stdout) == (128 + signal.SIGTERM, "unwound\n")
+    assert done.stderr == "\nstopped by SIGTERM; to go on, run again: python -m pipelines\n"
+
+
 def test_a_full_disk_is_one_sentence_and_the_run_goes_on_from_there(tiny, tmp_path, cli, content):
     recipe, root = tmp_path / "tiny.toml", tmp_path / "out"
     recipe.write_text(tiny[0])
