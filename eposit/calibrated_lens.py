@@ -20,6 +20,8 @@ COEFFICIENTS: dict[str, tuple[tuple[str, ...], str]] = {
     EUCM: (("alpha", "beta"), "Kalibr"),
     DOUBLE_SPHERE: (("xi", "alpha"), "Kalibr"),
 }
+MOST_COEFFICIENT = 1e12  # of any lens: with larger ones powers of its polynomials are infinite
+LEAST_COEFFICIENT = 1e-200  # smaller leading ones change nothing at any angle, and dividing by them overflows
 MOST_COEFFICIENTS = max(len(names) for names, _ in COEFFICIENTS.values())
 
 
@@ -195,18 +197,19 @@ def double_sphere(coefficients: tuple[float, ...]) -> Lens:
 
 
 def _require(name: str, coefficients: tuple[float, ...]) -> None:
-    """Refuse another number of coefficients, and values that are not finite."""
+    """Refuse another number of coefficients, and values that no lens has."""
     names, source = COEFFICIENTS[name]
-    if len(coefficients) != len(names) or not np.all(np.isfinite(coefficients)):
+    if len(coefficients) != len(names) or not np.all(np.abs(coefficients) <= MOST_COEFFICIENT):
         raise ValueError(
-            f"lens {name!r} takes {len(names)} finite coefficients {', '.join(names)}, got {list(coefficients)}; "
-            f"give them as in {source}"
+            f"lens {name!r} takes {len(names)} finite coefficients {', '.join(names)} up to {MOST_COEFFICIENT:g}, "
+            f"got {list(coefficients)}; give them as in {source}"
         )
 
 
 def _first_turn(rise: np.polynomial.Polynomial) -> float:
     """Where an odd polynomial stops to rise, from its derivative in the square of its argument; inf if nowhere."""
-    turns = [root.real for root in np.atleast_1d(rise.roots()) if abs(root.imag) < 1e-12 and root.real > 0.0]
+    roots = np.atleast_1d(rise.trim(LEAST_COEFFICIENT).roots())
+    turns = [root.real for root in roots if abs(root.imag) < 1e-12 and root.real > 0.0]
     return float(np.sqrt(min(turns))) if turns else np.inf
 
 

@@ -75,8 +75,9 @@ class Camera:
         side = np.hypot(x, y)
         radius = self.law.rho(_seen_angle(side, z))
         on_axis = side == 0.0
-        scale = np.where(on_axis, 0.0, radius / np.where(on_axis, 1.0, side)) + 0.0 * radius
-        return np.stack((self.fx * x * scale + self.cx, self.fy * y * scale + self.cy), axis=-1)
+        with np.errstate(over="ignore", invalid="ignore"):  # of points of the largest and the smallest numbers
+            scale = np.where(on_axis, 0.0, radius / np.where(on_axis, 1.0, side)) + 0.0 * radius
+            return np.stack((self.fx * x * scale + self.cx, self.fy * y * scale + self.cy), axis=-1)
 
     def sees(self, points_in_cam: ArrayLike) -> Mask:
         """(..., 3) points to a (...) mask: the lens gives the point an image (inside the picture or not)."""

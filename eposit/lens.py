@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from eposit.arrays import shown
 from eposit.calibrated_lens import CALIBRATED, COEFFICIENTS
 from eposit.lens_law import Lens
 
@@ -75,7 +76,7 @@ def get_lens(name: str, coefficients: tuple[float, ...] = ()) -> Lens:
     if name in CALIBRATED:
         return CALIBRATED[name](tuple(float(k) for k in coefficients))
     if name not in LENSES:
-        raise ValueError(f"unknown lens {name!r}; known lenses are {', '.join(LENS_NAMES)}")
+        raise ValueError(f"unknown lens {shown(name)}; known lenses are {', '.join(LENS_NAMES)}")
     if len(coefficients):
         raise ValueError(f"lens {name!r} takes no coefficients, got {len(coefficients)}; leave `coefficients` empty")
     return LENSES[name]

@@ -65,7 +65,9 @@ def as_object(points_in_obj: ArrayLike) -> Array:
         raise ValueError(f"points_in_obj has shape {obj.shape}; it must be (n, 3)")
     if len(obj) < 4:
         raise ValueError(f"points_in_obj has {len(obj)} points; a pose needs at least 4")
-    if not math.isfinite(obj.sum()) and not np.all(np.isfinite(obj)):
+    with np.errstate(over="ignore"):
+        total = obj.sum()
+    if not math.isfinite(total) and not np.all(np.isfinite(obj)):
         raise ValueError("points_in_obj has NaN or infinite coordinates; give finite ones")
     return obj
 

@@ -122,6 +122,8 @@ def _told(error: Exception) -> str | None:
         return str(error)
     if isinstance(error, PermissionError):
         return f"cannot use {error.filename}: this user has no permission; ask its owner"
+    if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
+        return f"cannot use {error.filename}: its name is longer than this file system has names; give a shorter one"
     if isinstance(error, OSError) and error.errno in FULL:
         return str(refused(Path(error.filename or "a file"), error))
     if isinstance(error, MemoryError):

@@ -19,6 +19,7 @@ UNFINISHED = 75  # EX_TEMPFAIL: the same command may succeed
 BY_SIGNAL = 128  # plus the signal's number, as a shell tells it
 SIGNALS = tuple(name for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 LONGEST_LINE = 2000  # letters of a line of an error
+AGAIN_S = 0.05  # until a signal comes once more that could not be raised
 PATIENCE_S = 5.0  # for what a signal finds at work: native code does not listen
 
 
@@ -58,6 +59,7 @@ def _short(line: str) -> str:
 
 def listen() -> None:
     """From now on Ctrl-C, SIGTERM and SIGHUP raise `Stopped`; those that the caller has us ignore stay ignored."""
+    sys.unraisablehook = _raise_again
     for name in SIGNALS:
         number = getattr(signal, name)
         if signal.getsignal(number) is not signal.SIG_IGN:
@@ -83,6 +85,15 @@ def _stop(number: int, frame: FrameType | None) -> None:
         signal.signal(getattr(signal, name), _leave)
     threading.Thread(target=_leave_late, args=(number,), daemon=True).start()
     raise Stopped(number)
+
+
+def _raise_again(lost: sys.UnraisableHookArgs) -> None:
+    """A signal that comes while the interpreter calls a destructor cannot be raised from there: it comes once more."""
+    if not isinstance(lost.exc_value, Stopped):
+        sys.__unraisablehook__(lost)
+        return
+    listen()
+    threading.Timer(AGAIN_S, os.kill, (os.getpid(), lost.exc_value.number)).start()
 
 
 def _leave(number: int, frame: FrameType | None = None) -> None:

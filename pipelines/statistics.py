@@ -148,3 +148,14 @@ def percent(value: Interval, digits: int = 1) -> str:
     """`95.0 [94.6, 95.3] %`."""
     shown = [f"{100.0 * number:.{digits}f}" for number in (value.value, value.low, value.high)]
     return f"{shown[0]} [{shown[1]}, {shown[2]}] %"
+
+
+def squares_over(covariance: Array, errors: Array) -> Array:
+    """(n,) e^T C^-1 e of errors (n, k) and their covariances (n, k, k); NaN where a covariance is singular."""
+    try:
+        solved = np.linalg.solve(covariance, errors[..., None])[..., 0]
+    except np.linalg.LinAlgError:  # raised for all of them if one is singular
+        if len(errors) == 1:
+            return np.full(1, np.nan)
+        return np.concatenate([squares_over(covariance[i : i + 1], errors[i : i + 1]) for i in range(len(errors))])
+    return np.sum(errors * solved, axis=1)

@@ -13,6 +13,7 @@ import pyarrow as pa
 import pytest
 
 from datasets.store.dataset import open_dataset
+from datasets.store.known_shards import KNOWN_FILE
 from datasets.store.shard_file import DIGEST_KEY, PLACE_KEY, RECIPE_KEY, VERSION_KEY, read_rows, write_rows
 
 
@@ -83,6 +84,11 @@ def files(folder):
     """Path to content and time of every file under a folder."""
     found = (path for path in folder.rglob("*") if path.is_file())
     return {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in found}
+
+
+def left_behind(root):
+    """Hidden files under a dataset's folder: temporary ones, locks; not what it keeps of its footers."""
+    return [path for path in root.rglob(".*") if path.name != KNOWN_FILE]
 
 
 def assert_one_sentence(code, err, words):

@@ -12,9 +12,12 @@ def read_small_text(path: Path) -> str:
     """The text of a file in UTF-8, without a byte order mark.
 
     Raises:
-        OSError: it cannot be read, is a device or a pipe, which might never end, or is too large; strerror says so.
+        OSError: it has no possible name, cannot be read, is a device or a pipe, which might never end, or is too
+            large; strerror says so.
         UnicodeDecodeError: it is not UTF-8.
     """
+    if "\0" in str(path):
+        raise OSError(errno.EINVAL, "its name holds a zero byte", str(path))
     if path.exists() and not path.is_dir() and not path.is_file():
         raise OSError(errno.EINVAL, "it is a device or a pipe", str(path))
     with path.open(encoding="utf-8-sig") as file:

@@ -26,7 +26,7 @@ def with_world_file(text: str, folder: Path, source: str) -> str:
     """
     try:
         data = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError):
+    except (ValueError, RecursionError):  # no TOML, or a number of thousands of digits
         return text
     world = data.get("world")
     if not isinstance(world, dict) or not isinstance(world.get("file"), str) or not world["file"]:

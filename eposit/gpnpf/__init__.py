@@ -22,6 +22,7 @@ STEPS = 200  # of Gauss-Newton at most: four points need 1 to 3; see `solve` for
 COLLINEAR = 1e-4  # second over first spread of an object below which there is no pose
 
 
+@np.errstate(all="ignore")  # of sizes whose squares no number holds there is no solution
 def solve(
     points_in_obj: ArrayLike, points_px: ArrayLike, camera: Camera, *, sigma_px: ArrayLike | None = None
 ) -> Estimate:

@@ -53,6 +53,7 @@ class _System:
     unit: Array  # (m,)
 
 
+@np.errstate(all="ignore")  # of sizes whose squares no number holds there is no solution
 def solve(
     points_in_obj: ArrayLike,
     points_px: ArrayLike,

@@ -25,6 +25,7 @@ REPRODUCED_PX2 = 1e-6  # sum of squares above which a root is none: true ones le
 ASKEW = (0.7, -1.1, 0.4)  # rotation vector that turns the object's axes away from those of its points; any will do
 
 
+@np.errstate(all="ignore")  # of sizes whose squares no number holds there is no solution
 def solve(
     points_in_obj: ArrayLike, points_px: ArrayLike, camera: Camera, *, sigma_px: ArrayLike | None = None
 ) -> Estimate:
@@ -71,6 +72,8 @@ def _nothing(offsets: Array) -> CameraCandidates:
 def _candidates(points_in_obj: Array, offsets: Array) -> CameraCandidates:
     """Real solutions of (b, 4, 2) offsets from the principal point."""
     size = np.sqrt(np.mean(np.sum((points_in_obj - points_in_obj[0]) ** 2, axis=1)))
+    if not 0.0 < size < np.inf:  # no number holds the squares
+        return _nothing(offsets)
     askew = rotation_from_vector(ASKEW)
     obj = (points_in_obj - points_in_obj[0]) @ askew.T / size
     w = (offsets[..., 0] + 1j * offsets[..., 1]).T

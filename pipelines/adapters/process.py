@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import os
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
@@ -131,7 +132,17 @@ def check_limit(limit_s: float) -> None:
 
 
 def _serve(pipe: Connection, name: str, form: Form) -> None:
-    """Call the function for what comes through the pipe; what it prints goes to stderr."""
+    """Call the function for what comes through the pipe; what it prints goes to stderr.
+
+    A function may break what this needs, as the pipe's descriptor or an import: the process then ends with a line.
+    """
+    try:
+        _answer_calls(pipe, name, form)
+    except Exception as error:
+        sys.exit(f"{form.option} {name} broke its own process ({type(error).__name__}: {error})")
+
+
+def _answer_calls(pipe: Connection, name: str, form: Form) -> None:
     own = os.getpid()
     if hasattr(os, "setpgid"):
         os.setpgid(0, 0)

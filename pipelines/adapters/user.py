@@ -23,6 +23,7 @@ NAME = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*(\.[^\W\d]\w*)*")
 SIGMA = "sigma_px"
 SOLVER_FORM = f"(points_in_obj, points_px, camera, *, {SIGMA}=None)"
 ROTATION_TOLERANCE = 1e-5  # of R^T R - 1; what was computed in single precision is off by some 1e-7
+MOST_ITERATIONS = 2**31 - 1  # what the column of a table holds
 
 
 def is_given(name: str) -> bool:
@@ -156,7 +157,7 @@ def _of_object(result: Any, what: str) -> PoseResult:
     iterations, covariance = getattr(result, "iterations", None), getattr(result, "covariance", None)
     if answer.status != Status.OK:
         return answer
-    count = 0 if iterations is None else int(_numbers(iterations, (), f"{what} gave iterations"))
+    count = 0 if iterations is None else _count(iterations, f"{what} gave iterations")
     spread = answer.covariance if covariance is None else _numbers(covariance, (6, 6), f"{what} gave a covariance")
     return PoseResult(answer.status, answer.R, answer.t, count, spread)
 
@@ -182,6 +183,8 @@ def _is_status(value: Any) -> bool:
 
 def _numbers(value: Any, shape: tuple[int, ...], what: str) -> Array:
     try:
+        if np.iscomplexobj(value):
+            raise TypeError  # their real parts are no answer
         array = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
         raise UserError(f"{what} as {_kind(value)}; it must be numbers of shape {shape}") from None
@@ -189,6 +192,13 @@ def _numbers(value: Any, shape: tuple[int, ...], what: str) -> Array:
         hint = ", such as cv2.Rodrigues makes of a rotation vector" if shape == (3, 3) and array.size == 3 else ""
         raise UserError(f"{what} of shape {array.shape}; it must be of shape {shape}{hint}")
     return array
+
+
+def _count(value: Any, what: str) -> int:
+    number = float(_numbers(value, (), what))
+    if not 0.0 <= number <= MOST_ITERATIONS:
+        raise UserError(f"{what} {number:g}; it must be a number from 0 to {MOST_ITERATIONS}")
+    return int(number)
 
 
 def _fault(answer: PoseResult) -> str | None:

@@ -24,6 +24,7 @@ from pipelines.nightly.metrics import CORNERS, METRICS, POSES, SIGNED_POSES, Met
 from pipelines.report.data import SETTING
 from pipelines.report.points import PointErrors, point_errors
 from pipelines.stages.estimate import REACHES_BOUND
+from pipelines.statistics import squares_over
 from render.sensor.presets import regime_of
 
 EXACT_POINTS = "truth"  # poses of exact points: their errors are rounding, whose size means nothing
@@ -182,8 +183,7 @@ def _pose_nees(dataset: Dataset, scores: pa.Table) -> Array:
     known = np.all(np.isfinite(normalised), axis=1) & np.all(np.isfinite(correlation), axis=(1, 2))
     nees = np.full(len(normalised), np.nan)
     if np.any(known):
-        solved = np.linalg.solve(correlation[known], normalised[known][..., None])[..., 0]
-        nees[known] = np.sum(normalised[known] * solved, axis=1) / 6.0
+        nees[known] = squares_over(correlation[known], normalised[known]) / 6.0
     return nees
 
 

@@ -14,6 +14,7 @@ from datasets.store.dataset import Dataset
 from eposit.arrays import Array, Mask
 from eposit.pose import rotation_error_vector
 from pipelines.report.data import SETTING
+from pipelines.statistics import squares_over
 
 POSE = (*QUATERNION_COLUMNS, *POSITION_COLUMNS)
 COVERED = 1.96  # stated deviations that 95 % of normal errors stay within
@@ -91,8 +92,7 @@ def _squares(error: Array, bound: Array) -> Array:
     scale = np.sqrt(np.einsum("nii->ni", bound[known]))
     scaled = error[known] / scale
     correlation = bound[known] / (scale[:, :, None] * scale[:, None, :])
-    whitened = np.linalg.solve(correlation, scaled[..., None])[..., 0]
-    squares[known] = np.mean(scaled * whitened, axis=1)
+    squares[known] = squares_over(correlation, scaled) / scaled.shape[1]
     return squares
 
 

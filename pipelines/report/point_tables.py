@@ -163,6 +163,7 @@ def field_rows(points: Sequence[PointTally], frames: Sequence[dict[str, Any]]) -
 
 
 def _angle_bands(theta: Array, own: Mask) -> Iterator[tuple[float, Mask]]:
+    own = own & np.isfinite(theta)
     if not np.any(own):
         return
     for angle in np.arange(0.0, theta[own].max() + ANGLE_STEP_DEG, ANGLE_STEP_DEG):

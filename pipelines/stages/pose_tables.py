@@ -14,6 +14,7 @@ import pyarrow.parquet as pq
 
 from datasets.errors import UserError
 from datasets.rows import POSITION_COLUMNS, QUATERNION_COLUMNS
+from datasets.store.texts import total_bytes
 
 FRAME = "frame_id"
 MATRIX = tuple(f"r{row}{column}" for row in "123" for column in "123")
@@ -24,6 +25,7 @@ NamesAndColumns = tuple[list[str], list[list[Any]]]
 Reader = Callable[[Path], NamesAndColumns]
 KNOWN = frozenset({FRAME, "status", *QUATERNION_COLUMNS, *MATRIX, *VECTOR, *(n for names in POSITIONS for n in names)})
 MOST_ROWS, MOST_BYTES = 2_000_000, 1_000_000_000  # of a file of poses
+MOST_TEXT_BYTES = 200_000_000  # of all texts of a column
 
 
 def columns_of(path: Path, reader: Reader | None = None) -> dict[str, list[Any]]:
@@ -54,8 +56,11 @@ def columns_of(path: Path, reader: Reader | None = None) -> dict[str, list[Any]]
 
 
 def _read_parquet(path: Path) -> NamesAndColumns:
-    with pq.ParquetFile(path) as file:
-        check_rows(path, file.metadata.num_rows)
+    metadata = pq.read_metadata(path)
+    _check_size(path, metadata)
+    stored = (metadata.schema.column(i) for i in range(metadata.num_columns))
+    texts = [column.path for column in stored if column.physical_type == "BYTE_ARRAY"]
+    with pq.ParquetFile(path, metadata=metadata, read_dictionary=texts) as file:
         names = [name for name in file.schema_arrow.names if name in KNOWN or name in LISTS]
         table = file.read(names)
         # Of other columns the names alone are told where one is missing.
@@ -67,11 +72,29 @@ def _read_parquet(path: Path) -> NamesAndColumns:
     return [*header, *others], [*values, *([] for _ in others)]
 
 
+def _check_size(path: Path, metadata: pq.FileMetaData) -> None:
+    """Refuse a file before anything of it is unpacked: a small one may unpack to more than memory can hold.
+
+    Raises:
+        UserError: too many rows, values in lists, or bytes.
+    """
+    check_rows(path, metadata.num_rows)
+    groups = (metadata.row_group(i) for i in range(metadata.num_row_groups))
+    columns = [group.column(i) for group in groups for i in range(group.num_columns)]
+    unpacked = sum(max(0, column.total_uncompressed_size) for column in columns)
+    if unpacked > MOST_BYTES or any(column.num_values > len(VECTOR) * MOST_ROWS for column in columns):
+        raise UserError(f"{path} unpacks to {unpacked // 10**6} MB; give --poses a file with a row for each image")
+
+
 def _without_lists(path: Path, table: pa.Table) -> NamesAndColumns:
     """Names and columns, those with a vector of three numbers in a row as three columns."""
     header: list[str] = []
     values: list[list[Any]] = []
     for name, column in zip(table.column_names, table.columns, strict=True):
+        if pa.types.is_dictionary(column.type):  # a long text is stored once, and stands in every row
+            if total_bytes(column) > MOST_TEXT_BYTES:
+                raise UserError(f"{path}: the texts of {name} have more than {MOST_TEXT_BYTES // 10**6} MB; mend them")
+            column = column.cast(column.type.value_type)
         rows = column.to_pylist()
         if name not in LISTS:
             header, values = [*header, name], [*values, rows]

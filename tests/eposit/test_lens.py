@@ -209,6 +209,7 @@ def test_axis_centre_and_backward(name):
         {"width": 0},
         {"coefficients": (0.1,)},
         {"lens": "pinhole_radial", "coefficients": (0.1, 0.0)},
+        {"lens": "pinhole_radial", "coefficients": (0.0, 1e300, -0.1)},
         {"lens": "eucm", "coefficients": (1.2, 1.0)},
         {"lens": "eucm", "coefficients": (0.5, 0.0)},
         {"lens": "double_sphere", "coefficients": (1.0, 0.5)},
@@ -218,3 +219,9 @@ def test_wrong_camera_is_a_sentence(wrong):
     good = {"lens": "equisolid", "fx": 1.0, "fy": 1.0, "cx": 0.0, "cy": 0.0, "width": 2, "height": 2}
     with pytest.raises(ValueError, match=r"\w+ .*(;|must)"):
         Camera(**(good | wrong))
+
+
+@pytest.mark.filterwarnings("error")
+def test_extreme_coefficients_warn_of_nothing():
+    for coefficients in ((0.0, 0.0, 1e-320), (1e12, -1e12, 1e12), (-0.1, 0.0, 1e-310)):
+        assert np.isfinite(pinhole_radial(coefficients).rho(np.array([0.1]))[0]) or coefficients[0] == 1e12

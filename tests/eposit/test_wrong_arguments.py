@@ -88,6 +88,14 @@ def test_extreme_sizes_give_a_pose_of_that_size_or_none(size, method):
         np.testing.assert_allclose(found.cam_from_obj.t / size, [50.0, -40.0, 2000.0], rtol=1e-3, atol=0.1)
 
 
+@pytest.mark.parametrize("size", [1e-310, 1e-160, 1e160, 1e300])
+@pytest.mark.parametrize("solve", [eposit.solve, eposit.opnp.solve, gpnpf.solve, eposit.pnpfr.solve])
+@pytest.mark.filterwarnings("error")
+def test_extreme_sizes_warn_of_nothing(size, solve):
+    solve(POINTS[:4] * size, PIXELS[:4], CAMERA)
+    CAMERA.project(POINTS * size * [1.0, 1.0, 1e-10])
+
+
 def test_many_points_take_memory_as_they_grow():
     n = 200_000
     rng = np.random.default_rng(4)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import math
 import shutil
 import sys
 import tempfile
+import time
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -27,6 +29,7 @@ def main() -> int:
     parser.add_argument("--cases", type=int, default=150, help="of each kind")
     parser.add_argument("--first", type=int, default=0, help="number of the first one")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--seconds", type=float, default=math.inf, help="no case begins later than this")
     parser.add_argument("--only", choices=KINDS, action="append", help="a kind; may be given again")
     parser.add_argument("--source", type=Path, help="finished dataset of the tests' tiny recipe; made if left out")
     parser.add_argument("--verbose", action="store_true", help="a line for each case")
@@ -71,8 +74,11 @@ def _warm(source: Path, copy: Path) -> None:
 def _all(asked: argparse.Namespace, source: Path, folder: Path) -> Iterator[tuple[str, Outcome]]:
     adopt_orphans()
     modules = {name: importlib.import_module(f"tests.hostile.kinds.{name}") for name in asked.only or KINDS}
+    end = time.monotonic() + asked.seconds
     for number in range(asked.first, asked.first + asked.cases):
         for name, module in modules.items():
+            if time.monotonic() > end:
+                return
             seed = f"{asked.seed} {name} {number}"
             yield f"{name} {number}", run_case(module, seed, source.resolve(), TINY, folder)
 

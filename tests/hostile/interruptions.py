@@ -26,6 +26,7 @@ from tests.conftest import TINY
 from tests.hostile.__main__ import warmed
 from tests.hostile.running import adopt_orphans, orphans
 from tests.signals import heed_signals
+from tests.wrong_input import left_behind
 
 LIMIT_S = 300.0
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -58,7 +59,7 @@ def _all(asked: argparse.Namespace, folder: Path) -> Iterator[str]:
     code, error = ended(started(recipe, folder / "undisturbed", folder), folder)
     if code:
         raise SystemExit(f"an undisturbed run ended with {code}: {error}")
-    seconds, wanted = time.monotonic() - begin, _content(folder / "undisturbed")
+    seconds, wanted = time.monotonic() - begin, content(folder / "undisturbed")
     print(f"an undisturbed run takes {seconds:.1f} s; content {wanted}", flush=True)
     draw = random.Random(asked.seed)
     for number in range(asked.kills):
@@ -166,13 +167,14 @@ def _resumed(recipe: Path, root: Path, folder: Path, wanted: str, what: str) -> 
     code, error = ended(started(recipe, root, folder), folder)
     if code:
         yield f"{what}, resumed: exit code {code}: {error[-300:]}"
-    elif _content(root) != wanted:
+    elif content(root) != wanted:
         yield f"{what}: resumed, the content is another one"
-    elif [*root.rglob(".*")]:
+    elif left_behind(root):
         yield f"{what}: resumed, hidden files are left"
 
 
-def _content(root: Path) -> str:
+def content(root: Path) -> str:
+    """Content hash of a dataset, or the first problem that `verify` finds in it."""
     digest, problems = verify(open_dataset(root))
     return problems[0].text if problems else digest
 

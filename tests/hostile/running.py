@@ -65,7 +65,10 @@ def run_case(kind: ModuleType, seed: str, source: Path, text: str, folder: Path)
     if pid == 0:
         _child(kind, seed, source, text, folder)
     status, usage, late = _wait(pid, begin + LIMIT_S * getattr(kind, "PATIENCE", 1))
-    outcome = _outcome(folder, time.monotonic() - begin, usage.ru_maxrss * 1024)
+    rss = usage.ru_maxrss * 1024
+    outcome = _outcome(folder, time.monotonic() - begin, rss)
+    if rss > getattr(kind, "MOST_RSS", MOST_RSS):
+        outcome.faults.append(f"took {rss / 2**20:.0f} MB")
     outcome.faults += [f"no end within {outcome.seconds:.0f} s"] if late else _ending(status)
     left = orphans()
     if left:
@@ -172,8 +175,6 @@ def _outcome(folder: Path, seconds: float, rss: int) -> Outcome:
     faults += [f"exit code {code}" for code in codes if code not in ALLOWED]
     for code, error in zip(codes, errors, strict=False):
         faults += _faults_of_words(code, error)
-    if rss > MOST_RSS:
-        faults.append(f"took {rss / 2**20:.0f} MB")
     if [path.name for path in (folder / "outside").iterdir()] != ["precious.txt"] or _text(
         folder / "outside" / "precious.txt"
     ) != "not to be touched":

@@ -17,7 +17,7 @@ from pipelines.cli import guarded
 from pipelines.endings import UNEXPECTED, UNFINISHED
 from pipelines.stages import generate
 from tests.signals import heed_signals
-from tests.wrong_input import first
+from tests.wrong_input import first, left_behind
 
 ROOT = Path(__file__).parents[2]
 PATIENCE_S = 120.0
@@ -81,7 +81,35 @@ def test_a_signal_at_any_moment_is_one_sentence_and_loses_nothing(number, moment
         assert_stopped(process, number)
     assert cli("run", recipe, "--out", root, "-q").code == 0
     assert content(root) == content(tiny[1])
-    assert list(root.rglob(".*")) == []
+    assert left_behind(root) == []
+
+
+IN_A_DESTRUCTOR = """
+import os, signal, sys, time
+from pipelines.endings import Stopped, listen, say_stopped
+
+class Dying:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGTERM)
+        for _ in range(1000):
+            pass
+
+listen()
+try:
+    Dying()
+    time.sleep(60)
+except Stopped as stop:
+    print("unwound")
+    sys.exit(say_stopped(stop.number))
+"""
+
+
+def test_a_signal_in_a_destructor_which_can_raise_nothing_is_one_sentence(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-c", IN_A_DESTRUCTOR], cwd=ROOT, capture_output=True, text=True, timeout=PATIENCE_S
+    )
+    assert (done.returncode, done.stdout) == (128 + signal.SIGTERM, "unwound\n")
+    assert done.stderr == "\nstopped by SIGTERM; to go on, run again: python -m pipelines\n"
 
 
 def test_a_full_disk_is_one_sentence_and_the_run_goes_on_from_there(tiny, tmp_path, cli, content):

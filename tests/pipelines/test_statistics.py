@@ -13,6 +13,7 @@ from pipelines.statistics import (
     percent,
     percentile95,
     rate,
+    squares_over,
     student,
     tail,
     wilson,
@@ -112,3 +113,12 @@ def test_a_95th_percentile_needs_enough_units_and_values_of_one_do_not_count():
     lost = values.copy()
     lost[3] = np.nan
     assert tail(lost) is None
+
+
+def test_errors_over_their_covariances_and_nan_where_one_is_singular():
+    errors = np.random.default_rng(2).standard_normal((3, 6))
+    covariances = np.array([np.diag(np.arange(1.0, 7.0)), np.full((6, 6), 1e30), np.eye(6)])
+    found = squares_over(covariances, errors)
+    assert found[0] == pytest.approx(np.sum(errors[0] ** 2 / np.arange(1.0, 7.0)))
+    assert np.isnan(found[1])
+    assert found[2] == pytest.approx(np.sum(errors[2] ** 2))

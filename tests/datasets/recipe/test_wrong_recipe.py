@@ -50,6 +50,8 @@ RECIPES = {
     ),
     "coefficients for a pinhole": (added("coefficients = [0.1]"), "takes no coefficients"),
     "samples not a square": (recipe("samples = 4", "samples = 5"), "must be a square number"),
+    "seed of 5000 digits": (recipe("seed = 5", f"seed = {'9' * 5000}"), "use numbers, texts and lists"),
+    "name with a zero byte": (lambda place: ("describe", "a\0b.toml"), "its name holds a zero byte"),
     "negative seed": (recipe("seed = 5", "seed = -5"), "key 'seed' is -5"),
     "empty shards": (recipe("shard_frames = 1", "shard_frames = 0"), "key 'shard_frames' is 0"),
     "negative focal length": (recipe("fx = 344.7", "fx = -344.7"), "has fx -344.7"),

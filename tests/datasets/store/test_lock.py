@@ -186,10 +186,10 @@ def test_of_many_at_once_never_two_hold_unless_they_share(shared, tmp_path):
     assert most[0] > 1 if shared else most[0] == 1
 
 
-def _claims(root, which, start, told):
+def _claims(root, which, start, told, races):
     recipe = RECIPES[which]
     text = TINY.replace("seed = 5", f"seed = {which}")
-    for number in range(10):
+    for number in range(races):
         start.wait()
         try:
             with claim(root / str(number), recipe, text, shared=True):
@@ -198,16 +198,17 @@ def _claims(root, which, start, told):
             told.put((number, str(error)))
 
 
-def test_of_two_recipes_that_claim_a_folder_at_once_one_gets_it(tmp_path):
+@pytest.mark.parametrize("races", [10, pytest.param(300, marks=pytest.mark.slow)])
+def test_of_two_recipes_that_claim_a_folder_at_once_one_gets_it(races, tmp_path):
     context = multiprocessing.get_context("spawn")
     start, told = context.Barrier(2), context.Queue()
-    both = [context.Process(target=_claims, args=(tmp_path, which, start, told)) for which in range(2)]
+    both = [context.Process(target=_claims, args=(tmp_path, which, start, told, races)) for which in range(2)]
     for process in both:
         process.start()
-    answers = [told.get(timeout=60) for _ in range(20)]
+    answers = [told.get(timeout=60) for _ in range(2 * races)]
     for process in both:
         process.join()
-    for number in range(10):
+    for number in range(races):
         winner, loser = sorted(
             (answer for n, answer in answers if n == number), key=lambda answer: isinstance(answer, str)
         )

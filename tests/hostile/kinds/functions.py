@@ -128,6 +128,7 @@ IMPORTS = (
     "def solve(a, b, c, d, e): pass",
     "import sys; sys.modules['numpy'] = None\ndef solve(a, b, c): return None",
 )
+MOST_RSS = 2**40  # bytes: what a user's function takes is its own affair, and these ask for all that there is
 PATIENCE = 3  # an import may take two minutes
 
 

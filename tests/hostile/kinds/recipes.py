@@ -82,7 +82,6 @@ def _text(rng: random.Random, place: Place) -> tuple[str, Path]:
         "endless path": lambda: place.text.replace("stop = 90", "stop = 1e300"),
         "step zero": lambda: place.text.replace("step = 90", "step = 0"),
         "scatter of 1e9": lambda: _with_path(place.text, 'kind = "scatter"\ncount = 1000000000'),
-        "scatter of 1e5": lambda: _with_path(place.text, 'kind = "scatter"\ncount = 100000'),
         "scatter that fits nowhere": lambda: _with_path(
             place.text, 'kind = "scatter"\ncount = 5\ndepth_range_mm = [1, 2]'
         ),

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import errno
+import os
 
 import pytest
 
@@ -12,6 +14,7 @@ from pipelines.adapters.process import Form, check_limit, end_function_process, 
 from tests.own import own_module
 from tests.wrong_input import assert_one_sentence
 
+BAD_DESCRIPTOR = os.strerror(errno.EBADF)
 FORM = Form("--estimator", "(image, camera, target)", 3)
 MISCHIEF = """
     import os, signal, sys, time
@@ -87,10 +90,11 @@ def test_whatever_a_function_does_is_a_status(name, capfd):
     assert err == "so many words\n"
 
 
-def test_a_process_that_loses_its_pipe_is_a_status(name):
+def test_a_process_that_loses_its_pipe_is_a_status(name, capfd):
     with closing_process(name) as called:
         assert called.call(lambda _: None, "close", None, None).status == "solver_error"
         assert called.call(lambda _: None, "", None, None).status == "ok"
+    assert capfd.readouterr().err == f"--estimator {name} broke its own process (OSError: [Errno 9] {BAD_DESCRIPTOR})\n"
 
 
 @pytest.mark.parametrize(

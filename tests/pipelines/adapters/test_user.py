@@ -157,8 +157,11 @@ def test_a_pose_that_is_none_is_an_error_of_the_row(R, t, words):
         ((np.eye(4), np.zeros(3)), r"gave R of shape \(4, 4\); it must be of shape \(3, 3\)"),
         ((np.eye(3), np.zeros(4)), r"gave t of shape \(4,\)"),
         ((np.eye(3), "far"), "gave t as a str; it must be numbers"),
+        ((np.eye(3, dtype=complex), np.ones(3)), "gave R as a ndarray; it must be numbers"),
         (SimpleNamespace(status="ok", R=np.eye(3), t=np.ones(3), covariance=np.eye(3)), "gave a covariance of shape"),
         (SimpleNamespace(status="ok", R=np.eye(3), t=np.ones(3), iterations=[1]), "gave iterations of shape"),
+        (SimpleNamespace(status="ok", R=np.eye(3), t=np.ones(3), iterations=np.nan), "gave iterations nan; it must"),
+        (SimpleNamespace(status="ok", R=np.eye(3), t=np.ones(3), iterations=1e30), "gave iterations 1e.30; it must"),
     ],
 )
 def test_what_cannot_be_understood_names_the_function(result, words):

@@ -9,6 +9,7 @@ from tests.wrong_input import assert_refused, estimate, on_dataset
 CASES = {
     "missing recipe": (lambda place: ("run", place.folder / "no.toml", "--out", place.new()), "cannot read recipe"),
     "recipe is a folder": (lambda place: ("run", f"{place.folder}/", "--out", place.new()), "Is a directory"),
+    "dataset with a long name": (lambda place: ("frame", "x" * 300, 0), "its name is longer than"),
     "unknown recipe": (lambda place: ("run", "dmo", "--out", place.new()), "(did you mean 'demo'?)"),
     "describe an unknown recipe": (lambda place: ("describe", "smokey"), "(did you mean 'smoke'?)"),
     "unknown solver": (estimate("--solver", "upnp"), "unknown solver 'upnp'; choose one of best"),

@@ -21,6 +21,7 @@ FAILED = Outcome("accuracy", State.FAILED, "corner_x is 0.002 px off", Exit.WORS
 
 
 PASSED = Outcome("ran", State.PASSED, "all stages ran")
+MORE_DELAYS_S = [pytest.param(i / 100, marks=pytest.mark.slow) for i in range(1, 41)]
 CONTEXT = multiprocessing.get_context("spawn")  # Arrow's threads do not survive a fork
 
 
@@ -114,7 +115,9 @@ def _append_many(root, ids):
         _append(root, run_id, seed)
 
 
-@pytest.mark.parametrize("delay_s", [0.03, *(pytest.param(delay_s, marks=pytest.mark.full) for delay_s in (0.0, 0.1))])
+@pytest.mark.parametrize(
+    "delay_s", [0.03, *(pytest.param(delay_s, marks=pytest.mark.full) for delay_s in (0.0, 0.1, *MORE_DELAYS_S))]
+)
 def test_a_killed_append_loses_nothing(tmp_path, delay_s):
     """Whatever was there when the process was killed is whole, and the next append sweeps what it left."""
     ids = [f"{i:03d}" for i in range(500)]

@@ -1,5 +1,7 @@
 """The report: self-contained, and its tables are the scores."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -114,6 +116,14 @@ def test_detection_tables_count_every_board_and_corner(tiny):
     assert sum(row["frames"] for row in rows) == len(frames)
     assert all(row["boards"] <= row["frames"] for row in rows)
     assert sum(row["corners"] for row in corners) == np.sum(errors[0].in_image[:, :-1])
+
+
+def test_points_whose_angle_is_not_known_are_in_no_band(tiny):
+    dataset = open_dataset(tiny[1])
+    frames = dataset.read("frames", FRAME_COLUMNS).to_pylist()
+    errors = point_errors(dataset, frames)[0]
+    unknown = replace(errors, theta_deg=np.full_like(errors.theta_deg, np.nan))
+    assert field_rows([tallied(unknown, frames)], frames) == []
 
 
 def test_point_errors_are_the_tables_differences(tiny):

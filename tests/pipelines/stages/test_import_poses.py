@@ -251,6 +251,18 @@ def test_a_wrong_file_gives_one_sentence(case, root, tmp_path, cli):
     assert files(root) == before
 
 
+def test_a_small_file_that_unpacks_to_gigabytes_is_refused_before_it_does(root, tmp_path, cli):
+    """One text of a megabyte that stands in 4000 rows: the file has a few kB."""
+    path = tmp_path / "p.parquet"
+    texts = pa.DictionaryArray.from_arrays(pa.array([0] * 4000, pa.int32()), pa.array(["x" * 1_000_000]))
+    columns = {"frame_id": pa.array(range(4000)), **dict.fromkeys((*Q, *T), texts)}
+    pq.write_table(pa.table(columns), path, compression="zstd", store_schema=False)
+    before = pa.total_allocated_bytes()
+    done = cli("score", root, "--poses", path, "--name", "theirs")
+    assert_one_sentence(done.code, done.err, "the texts of q_w have more than 200 MB; mend them")
+    assert pa.total_allocated_bytes() - before < 100_000_000
+
+
 WRONG_WORDS = {
     "no name": (("--poses", "{}"), "--poses and --name go together"),
     "no poses": (("--name", "theirs"), "--poses and --name go together"),
