@@ -17,7 +17,7 @@ from rich.console import Console
 
 from datasets.recipe.model import parse_recipe
 from datasets.store import packing
-from datasets.store.atomic import copy_file
+from datasets.store.atomic import copy_file, write_bytes
 from datasets.store.claim import claim
 from datasets.store.dataset import Dataset, open_dataset
 from datasets.store.kept_masters import PACKED, Kept
@@ -25,7 +25,7 @@ from datasets.store.masters import archive_names
 from datasets.store.packing import pack_masters
 from datasets.store.refusals import RECIPE_FILE
 from datasets.store.zip_archive import write_archive
-from datasets.url_path import UrlPath
+from datasets.url_path import UrlPath, dataset_folder
 from datasets.verify import verify
 from datasets.verify.problems import Kind
 from pipelines.engines.local import LocalEngine
@@ -305,9 +305,16 @@ def test_damaged_light_is_not_taken(made, packed, tmp_path, cli, rendered):
     assert masters(tmp_path / "new") == masters(made / "packed")
 
 
-def test_it_is_made_and_mended_at_a_url(made, tmp_path, content):
+@pytest.fixture(params=["folder", pytest.param("s3", marks=pytest.mark.full)])
+def stored(request, tmp_path):
+    """A place in a store: of its kind in a folder, or on an S3 server."""
+    if request.param == "folder":
+        return UrlPath("file:", *(tmp_path / "store" / "demo").parts[1:])
+    return dataset_folder(f"s3://a:b@bucket/packed/demo?{request.getfixturevalue('server')}")
+
+
+def test_it_is_made_and_mended_at_a_url(made, stored, content):
     execution = Execution(LocalEngine(), Console(quiet=True))
-    stored = UrlPath("file:", *(tmp_path / "store" / "demo").parts[1:])
     for name in ("000000.exr", "000001.exr"):
         copy_file(made / "single" / "masters" / name, stored / "masters" / name)
     copy_file(made / "packed" / RECIPE_FILE, stored / RECIPE_FILE)
@@ -315,12 +322,14 @@ def test_it_is_made_and_mended_at_a_url(made, tmp_path, content):
     with claim(stored, parse_recipe(TEXT, "test"), TEXT, kept=Kept.ARCHIVES) as dataset:
         stages.run_generate(dataset, execution)
     assert content(stored) == content(made / "packed")
-    there = masters(tmp_path / "store" / "demo")
-    assert there == masters(made / "packed")
-    flip(0.25)(tmp_path / "store" / "demo", made)
+    assert masters(stored) == masters(made / "packed")
+    data = bytearray((stored / FIRST).read_bytes())
+    data[len(data) // 4] ^= 4
+    write_bytes(stored / FIRST, bytes(data))
     assert [item.kind for item in verify(dataset)[1]] == [Kind.DAMAGED]
-    assert repair(dataset, execution)[1] == []
-    assert masters(tmp_path / "store" / "demo") == there
+    aside, left = repair(dataset, execution)
+    assert ([path.read_bytes() for path in aside], left) == ([data], [])
+    assert masters(stored) == masters(made / "packed")
 
 
 def test_it_is_put_into_a_store_and_fetched(made, packed, tmp_path, cli):
