@@ -150,12 +150,30 @@ def percent(value: Interval, digits: int = 1) -> str:
     return f"{shown[0]} [{shown[1]}, {shown[2]}] %"
 
 
-def squares_over(covariance: Array, errors: Array) -> Array:
+def squares_over(covariances: Array, errors: Array) -> Array:
     """(n,) e^T C^-1 e of errors (n, k) and their covariances (n, k, k); NaN where a covariance is singular."""
+
+    def squares(c: Array, e: Array) -> Array:
+        return np.sum(e * np.linalg.solve(c, e[..., None])[..., 0], axis=1)
+
+    return _where_possible(squares, covariances, errors)
+
+
+def whitened(covariances: Array, errors: Array) -> Array:
+    """(n, k) L^-1 e with L L^T the covariances (n, k, k) of errors (n, k); NaN where one is not positive definite."""
+
+    def divided(c: Array, e: Array) -> Array:
+        return np.linalg.solve(np.linalg.cholesky(c), e[..., None])[..., 0]
+
+    return _where_possible(divided, covariances, errors)
+
+
+def _where_possible(divided: Callable[[Array, Array], Array], covariances: Array, errors: Array) -> Array:
+    """What `divided` gives, one by one and NaN where it cannot: NumPy refuses all matrices if one is singular."""
     try:
-        solved = np.linalg.solve(covariance, errors[..., None])[..., 0]
-    except np.linalg.LinAlgError:  # raised for all of them if one is singular
+        return divided(covariances, errors)
+    except np.linalg.LinAlgError:
         if len(errors) == 1:
-            return np.full(1, np.nan)
-        return np.concatenate([squares_over(covariance[i : i + 1], errors[i : i + 1]) for i in range(len(errors))])
-    return np.sum(errors * solved, axis=1)
+            return np.full_like(divided(np.eye(errors.shape[1])[None], errors), np.nan)
+        alone = (slice(i, i + 1) for i in range(len(errors)))
+        return np.concatenate([_where_possible(divided, covariances[i], errors[i]) for i in alone])

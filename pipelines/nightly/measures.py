@@ -177,8 +177,9 @@ def _pose_nees(dataset: Dataset, scores: pa.Table) -> Array:
     The stored normalised components are not enough, since the six errors depend on each other.
     """
     covariance = pose_covariances(dataset.read("estimates", ["covariance"]))
-    deviation = np.sqrt(np.einsum("bii->bi", covariance))
-    correlation = covariance / deviation[:, :, None] / deviation[:, None, :]
+    with np.errstate(all="ignore"):  # of what states variances that are none
+        deviation = np.sqrt(np.einsum("bii->bi", covariance))
+        correlation = covariance / deviation[:, :, None] / deviation[:, None, :]
     normalised = np.stack([_column(scores, f"{name}_normalised") for name in COMPONENTS], axis=1)
     known = np.all(np.isfinite(normalised), axis=1) & np.all(np.isfinite(correlation), axis=(1, 2))
     nees = np.full(len(normalised), np.nan)

@@ -89,15 +89,17 @@ def _squares(error: Array, bound: Array) -> Array:
     """(n,) mean square of errors (n, 6) in units of bounds (n, 6, 6); NaN where either is missing."""
     squares = np.full(len(error), np.nan)
     known = np.all(np.isfinite(error), axis=1) & np.all(np.isfinite(bound), axis=(1, 2))
-    scale = np.sqrt(np.einsum("nii->ni", bound[known]))
-    scaled = error[known] / scale
-    correlation = bound[known] / (scale[:, :, None] * scale[:, None, :])
+    with np.errstate(all="ignore"):  # of bounds that are none
+        scale = np.sqrt(np.einsum("nii->ni", bound[known]))
+        scaled = error[known] / scale
+        correlation = bound[known] / (scale[:, :, None] * scale[:, None, :])
     squares[known] = squares_over(correlation, scaled) / scaled.shape[1]
     return squares
 
 
 def _inside(error: Array, covariance: Array) -> Array:
     """(n,) share of the six errors that are within COVERED stated deviations; NaN where none are stated."""
-    deviations = np.sqrt(np.einsum("nii->ni", covariance))
+    with np.errstate(invalid="ignore"):
+        deviations = np.sqrt(np.einsum("nii->ni", covariance))
     inside = np.mean(np.abs(error) <= COVERED * deviations, axis=1)
     return np.where(np.all(np.isfinite(deviations), axis=1), inside, np.nan)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from datasets.rows import covariances_by_frame, numbers, of_detector, points_by_frame
 from datasets.store.dataset import Dataset
 from eposit.arrays import Array, Mask
+from pipelines.statistics import whitened
 from render.targets.kinds import AnyTarget
 
 
@@ -99,6 +100,5 @@ def _whitened(error: Array, covariance: Array) -> Array:
     out = np.full(error.shape, np.nan)
     known = np.all(np.isfinite(covariance), axis=(-1, -2)) & np.isfinite(error[..., 0])
     if np.any(known):
-        lower = np.linalg.cholesky(covariance[known])
-        out[known] = np.linalg.solve(lower, error[known][..., None])[..., 0]
+        out[known] = whitened(covariance[known], error[known])
     return out

@@ -104,7 +104,7 @@ def _normalised(rows: pa.Table, rotation: Array, translation: Array) -> dict[str
 
     rotation: (b, 3) vectors on the left, rad. translation: (b, 3) mm.
     """
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", divide="ignore"):
         values = np.hstack((rotation, translation)) / np.sqrt(np.einsum("bii->bi", pose_covariances(rows)))
     return {f"{name}_normalised": values[:, i] for i, name in enumerate(COMPONENTS)}
 
