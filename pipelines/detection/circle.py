@@ -153,15 +153,13 @@ class _Place:
             blur_px *= self._sharpened(blur_px)
             patch = self._patch(blur_px)
         around = self._patch(blur_px, doubt) if doubt else None
-        looks = [] if patch is None else [(patch, self._known(patch))]
+        fits = [] if patch is None else [self._fit(patch, self._known(patch))]
         if around is not None:
             known = self._known(around)
-            start = _best_start(around, known, self.unsure, self.radius)
-            looks.append((around, replace(known, start=start)))
-        if len(looks) == 2:
-            first, second = (fit_disc(*look).residual for look in looks)
-            looks = looks[int(first > GOOD_SHARE * second + ROUNDING) :]
-        return self._fit(*looks[0]) if looks else None
+            fits.append(self._fit(around, replace(known, start=_best_start(around, known, self.unsure, self.radius))))
+        if not fits:
+            return None
+        return fits[0] if fits[0].residual <= GOOD_SHARE * fits[-1].residual + ROUNDING else fits[-1]
 
     def _patch(self, blur_px: float, doubt: float = 0.0) -> Patch | None:
         return circle_patch(self.image, self.corners.board, self.seen, blur_px, self.target, doubt)
