@@ -210,7 +210,7 @@ WRONG_ROWS = {
 }
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+@pytest.mark.parametrize("suffix", [".csv", pytest.param(".parquet", marks=pytest.mark.full)])
 @pytest.mark.parametrize("case", WRONG_ROWS)
 def test_wrong_poses_give_one_sentence(case, suffix, poses, root, tmp_path, cli):
     change, words = WRONG_ROWS[case]
