@@ -53,7 +53,8 @@ class Lens:
         """Incidence angle (rad) for normalised radii (any shape); NaN for radii that no ray reaches."""
         radius = np.asarray(rho, dtype=np.float64)
         reached = (radius >= 0.0) & (radius <= self.rho_max)
-        angle = self.raw_theta(np.where(reached, radius, 0.0))
+        with np.errstate(all="ignore"):  # of radii whose powers no number holds
+            angle = self.raw_theta(np.where(reached, radius, 0.0))
         return np.where(reached & self.sees(angle), angle, np.nan)
 
     def _masked(self, law: LensFunction, theta: ArrayLike) -> Array:

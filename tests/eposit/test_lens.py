@@ -222,6 +222,7 @@ def test_wrong_camera_is_a_sentence(wrong):
 
 
 @pytest.mark.filterwarnings("error")
-def test_extreme_coefficients_warn_of_nothing():
+def test_extreme_coefficients_and_radii_warn_of_nothing():
+    pinhole_radial((0.0, 0.0, 1e-30)).theta(np.array([0.1, 1e300]))
     for coefficients in ((0.0, 0.0, 1e-320), (1e12, -1e12, 1e12), (-0.1, 0.0, 1e-310)):
         assert np.isfinite(pinhole_radial(coefficients).rho(np.array([0.1]))[0]) or coefficients[0] == 1e12

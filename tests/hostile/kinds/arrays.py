@@ -94,7 +94,7 @@ def _hostile(rng: random.Random, array: Any) -> Any:
         lambda: np.repeat(changed[:1], len(changed), 0),
         lambda: np.full_like(changed, np.nan),
         lambda: changed.view(type("Own", (np.ndarray,), {})),
-        lambda: np.matrix(changed),
+        lambda: np.matrix(changed) if changed.ndim == 2 else changed,
         lambda: memoryview(changed),
         lambda: changed.tobytes(),
         lambda: iter(changed),
