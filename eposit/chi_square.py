@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TypeVar
-
-import numpy as np
+from typing import overload
 
 from eposit.arrays import Array
 
 CONTRADICTION = 5.0  # standard deviations of a chi-square's cube root: one right fit in 3 million lies above
 
-Freedom = TypeVar("Freedom", float, Array)
+
+@overload
+def chi_square_limit(freedom: float) -> float: ...
 
 
-def chi_square_limit(freedom: Freedom) -> Freedom:
+@overload
+def chi_square_limit(freedom: Array) -> Array: ...
+
+
+def chi_square_limit(freedom: float | Array) -> float | Array:
     """The sum of squared residuals over their variances above which they contradict them, for 1 freedom or more.
 
     Source:
         Wilson and Hilferty 1931: the cube root of a chi-square over its freedom is nearly normal.
     """
     share = 2.0 / (9.0 * freedom)
-    return freedom * (1.0 - share + CONTRADICTION * np.sqrt(share)) ** 3
+    return freedom * (1.0 - share + CONTRADICTION * share**0.5) ** 3

@@ -34,8 +34,9 @@ LEAST_CONTRAST = 0.35  # of the board's: what a circle's edge must have
 SEARCH_SHARE = 0.1  # of a square: how far the centre may lie from where the board predicts it, if its map is sure
 FARTHEST_SHARE = 0.25  # of a square, however unsure it is
 CORNER_PX = 0.01  # an ordinary corner's uncertainty, of which that of the map follows
-ASPECT_SPREAD = 0.02  # of pixels that are not known to be square; or as far as the map's are from it
-LENS_SPREAD = (100.0, 100.0, 0.3, 0.3, 0.3)  # of the rest of a lens of which nothing is known: see `generic_lens`
+# How far a lens may lie from one with square pixels, its centre in the picture's, and equidistance, if nothing is known
+# of it; see `generic_lens`. Where the map's lies farther from it, the true one may, too: so many times as far.
+LENS_SPREAD, FARTHER = np.array([0.02, 100.0, 100.0, 0.3, 0.3, 0.3]), 3.0
 SURE_SHARE = 0.01  # of a square: a prediction less sure than this has the circle looked for around it
 LOOKS, FEWER_LOOKS = (
     (5, 9),
@@ -80,7 +81,7 @@ def find_circle(image: Picture, corners: Corners, target: Chessboard, misfit: fl
         return None
     harmless = min(math.ceil(axes[0] / LARGE_RADIUS_PX), max(1, int(corners.blur_px / LEAST_BLUR_PX)))
     by = max(harmless, math.ceil(axes[0] / MOST_RADIUS_PX))
-    unsure = _unsure(board, target)
+    unsure = _unsure(board, target, image.shape)
     if by == 1:
         return _Place(image, corners, target, misfit, unsure).circle()
     small = replace(corners, board=board.reduced(by), blur_px=corners.blur_px / by, noise=corners.noise / by**2)
@@ -153,13 +154,16 @@ class _Place:
             blur_px *= self._sharpened(blur_px)
             patch = self._patch(blur_px)
         around = self._patch(blur_px, doubt) if doubt else None
-        fits = [] if patch is None else [self._fit(patch, self._known(patch))]
-        if around is not None:
-            known = self._known(around)
-            fits.append(self._fit(around, replace(known, start=_best_start(around, known, self.unsure, self.radius))))
-        if not fits:
-            return None
-        return fits[0] if fits[0].residual <= GOOD_SHARE * fits[-1].residual + ROUNDING else fits[-1]
+        near = None if patch is None else self._fit(patch, self._known(patch))
+        if around is None:
+            return near
+        known = self._known(around)
+        far = self._fit(around, replace(known, start=_best_start(around, known, self.unsure, self.radius)))
+        if near is None:
+            return far
+        left, best = (cost_of(around, known, fit.values[:SHAPE]) for fit in (near, far))
+        good = GOOD_SHARE * best + ROUNDING * len(around.grey)
+        return _unless_apart(near, far) if left <= good else far
 
     def _patch(self, blur_px: float, doubt: float = 0.0) -> Patch | None:
         return circle_patch(self.image, self.corners.board, self.seen, blur_px, self.target, doubt)
@@ -193,6 +197,13 @@ class _Place:
         return float(minimize_scalar(left, bounds=between, method="bounded", options={"maxiter": SHARPENED_STEPS}).x)
 
 
+def _unless_apart(fit: DiscFit, other: DiscFit) -> DiscFit:
+    """A fit; how far another one lies that explains the picture as well is in its covariance."""
+    apart, covariance = other.values[:2] - fit.values[:2], fit.covariance.copy()
+    covariance[:2, :2] += np.outer(apart, apart)
+    return replace(fit, covariance=covariance)
+
+
 def _edge_blur(corners: Corners) -> float:
     """Px. Where black squares grew in print and meet at the corners, these look more blurred than the edges are."""
     beyond = float(np.mean(corners.widths_beyond_px))
@@ -219,19 +230,22 @@ def misfit_squares(corners: Corners, at: Array) -> float:
     return float(np.sqrt(max(2.0 * both.mean(), 0.0))) if len(both) else 0.0
 
 
-def _unsure(board: BoardMap, target: Chessboard) -> Array:
+def _unsure(board: BoardMap, target: Chessboard, shape: tuple[int, int]) -> Array:
     """(2, 2) covariance, squares^2, of how far the circle's height displaces it, as one view of the corners tells it.
 
-    Whether a lens is longer along x than along y looks much like a tilt.
+    Whether a lens is longer along x than along y looks much like a tilt. shape: height and width of the picture, px.
     """
     at, height = target.circle_centre[None, :2] / target.square_mm, target.circle_height_mm / target.square_mm
     slopes = board.slopes(grid(target.inner)).reshape(2 * target.circle_index, -1) / CORNER_PX
-    spread = np.array([max(ASPECT_SPREAD, abs(board.lens[1])), *LENS_SPREAD])
+    usual = np.array([0.0, (shape[1] - 1) / 2.0, (shape[0] - 1) / 2.0, 0.0, 0.0, 0.0])
+    spread = np.maximum(LENS_SPREAD, FARTHER * np.abs(board.lens[1:] - usual))
     slopes = np.vstack((slopes, np.diag(np.append(np.zeros(7), 1.0 / spread))))
     displaced = (board.slopes(at, height) - board.slopes(at))[0]
     size = np.maximum(np.linalg.norm(slopes, axis=0), 1e-12)
     change = np.linalg.inv(board.jacobian(at[0])) @ displaced / size
-    return change @ np.linalg.pinv((slopes / size).T @ (slopes / size), rcond=1e-12, hermitian=True) @ change.T
+    _, told, axes = np.linalg.svd(slopes / size, full_matrices=False)
+    along = change @ axes.T / np.maximum(told, 1e-13 * told[0])
+    return along @ along.T
 
 
 def _looked_for(unsure: Array) -> float:
