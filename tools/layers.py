@@ -5,6 +5,7 @@ Usage: python tools/layers.py OUT.svg. The order of the layers is that of the im
 
 from __future__ import annotations
 
+import argparse
 import sys
 import textwrap
 import tomllib
@@ -210,4 +211,6 @@ def main(out: Path) -> int:
 
 if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
-    sys.exit(main(Path(sys.argv[1])))
+    parser = argparse.ArgumentParser(description="Draw the layers as the imports are.")
+    parser.add_argument("out", type=Path, help="the picture, SVG")
+    sys.exit(main(parser.parse_args().out))

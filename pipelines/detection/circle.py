@@ -38,10 +38,8 @@ CORNER_PX = 0.01  # an ordinary corner's uncertainty, of which that of the map f
 # of it; see `generic_lens`. Where the map's lies farther from it, the true one may, too: so many times as far.
 LENS_SPREAD, FARTHER = np.array([0.02, 100.0, 100.0, 0.3, 0.3, 0.3]), 3.0
 SURE_SHARE = 0.01  # of a square: a prediction less sure than this has the circle looked for around it
-LOOKS, FEWER_LOOKS = (
-    (5, 9),
-    (3, 7),
-)  # places along both axes of the ellipse in which a circle is looked for; a large one
+LOOKS = (5, 9)  # places along both axes of the ellipse in which a circle is looked for
+FEWER_LOOKS = (3, 7)  # likewise a large one
 LOOK_SPREADS = 10.0  # half its axes, in deviations of the prediction: it is far from linear
 GOOD_SHARE = 1.2  # of the residuals of the best fit in the ellipse, up to which a fit from the prediction is kept
 FAR_SPREADS = 3.0  # of the prediction that a circle may lie off, for each that a linear map allows
