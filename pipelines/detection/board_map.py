@@ -32,7 +32,7 @@ class Hold(NamedTuple):
 
 
 GOOD_CORNERS = Hold()
-SEEN_CORNERS = Hold(1.0, 0.1, 0.15, 0.3)  # by a finder, some a few pixels off: they would bend a lens at will
+SEEN_CORNERS = Hold(1.0, 0.03, 0.15, 0.3)  # by a finder, some a few pixels off: they would bend a lens at will
 
 Lift = Callable[[Array], Array]  # (m, 2) places along a bent print to (m, 3) points, both in squares
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pipelines.detection.board_fit import fit_board
-from pipelines.detection.board_map import BoardMap, grid
+from pipelines.detection.board_map import SEEN_CORNERS, BoardMap, grid
 from pipelines.detection.corner_scatter import orthonormal
 from pipelines.detection.corner_sites import REACH, CornerSites
 from pipelines.detection.corners import refine_corners
