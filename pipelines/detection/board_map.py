@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,9 +16,23 @@ FOCAL_SHARES = (0.2, 0.3, 0.45, 0.7, 1.1, 2.0)  # focal lengths to start from, a
 WIDEST_RAD = 2.2  # largest angle of a ray that a start may give a corner
 START_CORNERS = 16  # that a start is worked out from
 FIT_STEPS = 100
-FREE = np.array([0.0, 2e-2, 100.0, 100.0, 0.3, 0.3, 0.3])  # how far a lens may lie from the start: see `generic_lens`
-HOLD_SHARE = 1e-6  # weight of that against one pixel of one corner: it decides only what nothing else does
 FORM_NODES = np.array([-1.0, -0.5, 0.5, 1.0])  # of the reach along a line, where its form is taken
+
+
+class Hold(NamedTuple):
+    """What decides how much of a lens the corners of one view tell; the rest stays near a usual lens.
+
+    A usual lens has square pixels, its centre in the picture's, and is an equidistance lens.
+    """
+
+    deviation_px: float = 0.003  # of a corner of median weight
+    aspect: float = 0.3  # spread of lenses about the usual one
+    centre: float = 0.2  # likewise, shares of the picture's longer side
+    bend: float = 0.4  # likewise, of each of k1, k2, k3
+
+
+GOOD_CORNERS = Hold()
+SEEN_CORNERS = Hold(1.0, 0.03, 0.15, 0.3)  # by a finder, some a few pixels off: they would bend a lens at will
 
 Lift = Callable[[Array], Array]  # (m, 2) places along a bent print to (m, 3) points, both in squares
 
@@ -41,23 +56,50 @@ class BoardMap:
         size: tuple[int, int],
         weights: Array,
         start: BoardMap | None = None,
-        hold: float = HOLD_SHARE,
+        hold: Hold = GOOD_CORNERS,
         lift: Lift | None = None,
     ) -> BoardMap:
         """Least squares over corners (n, 2) px of points (n, 2) in squares.
 
-        size: width and height of the picture, px. weights: (n,) inverse variances, 0 for a corner that takes no part.
-        start: a map near by; without it, focal lengths over the whole range are tried. hold: how firmly the lens stays
-        near the start's; corners that are only known to a pixel would bend it at will. lift: of a bent board; the
-        start's if there is a start.
+        size: width and height of the picture, px. weights: (n,) relative inverse variances, 0 for a corner that takes
+        no part. start: a map near by; without it, the best of focal lengths over the whole range. lift: of a bent
+        board; the start's if there is a start.
         """
-        begin = _start(at, corners_px, size, weights > 0.0) if start is None else start
-        held = np.zeros(7)
-        held[1:] = hold * np.median(weights[weights > 0.0]) / FREE[1:] ** 2
-        lift = lift if start is None else start.lift
+        begin = replace(_starts(at, corners_px, size, weights > 0.0)[0], lift=lift) if start is None else start
+        return begin.fitted(at, corners_px, weights, _held(size, weights, hold))
+
+    @staticmethod
+    def fit_from_everywhere(
+        at: Array,
+        corners_px: Array,
+        size: tuple[int, int],
+        weights: Array,
+        hold: Hold = GOOD_CORNERS,
+        lift: Lift | None = None,
+    ) -> BoardMap:
+        """The best of the fits from every start; see `fit`.
+
+        A first map whose lens is a usual one may lead into a long valley of lenses that explain the corners less well:
+        where fx is twice fy, say.
+        """
+        used, held = weights > 0.0, _held(size, weights, hold)
+        best, least = None, np.inf
+        for start in _starts(at, corners_px, size, used):
+            board = replace(start, lift=lift)
+            for _ in range(2):  # the first may stop in a narrow valley
+                board = board.fitted(at, corners_px, weights, held)
+            cost = float(weights[used] @ np.sum((corners_px - board(at))[used] ** 2, axis=1))
+            if best is None or cost < least:
+                best, least = board, cost
+        assert best is not None  # there is always a start
+        return best
+
+    def fitted(self, at: Array, corners_px: Array, weights: Array, held: Array) -> BoardMap:
+        """This map after steps of least squares; see `fit` and, for `held`, `generic_lens.fit`."""
         pixels = np.where(weights[:, None] > 0.0, corners_px, 0.0)
-        points = _in_space(at, 0.0, lift)
-        return BoardMap(*generic_lens.fit(begin.R, begin.t, begin.lens, points, pixels, weights, held, FIT_STEPS), lift)
+        points = _in_space(at, 0.0, self.lift)
+        found = generic_lens.fit(self.R, self.t, self.lens, points, pixels, weights, held, FIT_STEPS)
+        return BoardMap(*found, self.lift)
 
     def __call__(self, at: Array, height: float = 0.0) -> Array:
         """(m, 2) or (2,) points in squares, `height` squares above the board, to (m, 2) or (2,) px."""
@@ -140,8 +182,18 @@ def normal_angles(jacobian: Array) -> Array:
     return np.stack((np.arctan2(-along_y[:, 0], along_y[:, 1]), np.arctan2(-along_x[:, 0], along_x[:, 1])), axis=1)
 
 
-def _start(at: Array, corners_px: Array, size: tuple[int, int], use: Mask) -> BoardMap:
-    """The best of the equidistance lenses at the picture's centre, each with the pose that its homography gives."""
+def _held(size: tuple[int, int], weights: Array, hold: Hold) -> Array:
+    """(2, 7) a usual lens and the weights that keep a lens near it; see `generic_lens.fit`."""
+    centre = hold.centre * max(size)
+    spread = np.array([hold.aspect, centre, centre, hold.bend, hold.bend, hold.bend])
+    held = np.zeros((2, generic_lens.LENS))
+    held[0, 2:4] = (np.array(size) - 1.0) / 2.0
+    held[1, 1:] = hold.deviation_px**2 * np.median(weights[weights > 0.0]) / spread**2
+    return held
+
+
+def _starts(at: Array, corners_px: Array, size: tuple[int, int], use: Mask) -> list[BoardMap]:
+    """Equidistance lenses at the picture's centre, each with the pose that its homography gives; the best one first."""
     centre = (np.array(size) - 1.0) / 2.0
     some = np.flatnonzero(use)[:: max(1, int(np.sum(use)) // START_CORNERS)]
     points, offset = np.column_stack((at[some], np.zeros(len(some)))), corners_px[some] - centre
@@ -157,4 +209,5 @@ def _start(at: Array, corners_px: Array, size: tuple[int, int], use: Mask) -> Bo
     found = np.empty((len(maps), len(some), 2))
     for board, pixels in zip(maps, found, strict=True):
         generic_lens.project(board.R, board.t, board.lens, x, y, z, pixels)
-    return maps[int(np.argmin(np.sum((found - corners_px[some]) ** 2, axis=(1, 2))))]
+    order = np.argsort(np.sum((found - corners_px[some]) ** 2, axis=(1, 2)), kind="stable")
+    return [maps[int(i)] for i in order]

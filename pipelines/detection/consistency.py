@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from eposit.arrays import Array, Mask
-from pipelines.detection.board_map import BoardMap
+from pipelines.detection.board_map import BoardMap, Hold
 from pipelines.detection.corner_scatter import leverage, scatter_about, scatter_of_neighbours
 
 LIMIT_PX = 0.5  # largest distance of a corner from the map through the others
@@ -15,6 +15,7 @@ LIMIT_SHARE = 0.03  # or this share of the local square, whichever is more
 LIMIT_SPREADS, MOST_SHARE = 4.0, 0.15  # or so many median distances, up to this share of the local square
 SHARP_SPREADS, SHARP_PX = 12.0, 0.1  # but no more than so many median distances, nor less than this: beside what covers
 # a part of the board a corner may be half a pixel off where all others agree to a hundredth
+PLACED_PX = 0.1  # deviation of a corner that something else placed, until their scatter is known
 BAD_SHARE = 0.25  # of the corners that may be inconsistent before the board is, and one of few in any case
 
 
@@ -58,7 +59,7 @@ def _agreeing(corners: Corners, at: Array, size: tuple[int, int]) -> Corners:
         if 2 * np.sum(good) <= board.slopes(at).shape[-1]:
             return replace(corners, consistent=np.zeros(len(at), bool))
         weights = _weights(corners.covariance_px2, good)
-        board = BoardMap.fit(at, points, size, weights, board)
+        board = BoardMap.fit(at, points, size, weights, board, hold_of(corners.covariance_px2, good))
         distance, spread = _left_out(points, board, at, weights)
         excess = np.where(good, distance / _limits(side, float(np.median(distance[good])) * spread, spread), 0.0)
         worst = int(np.argmax(excess))
@@ -87,7 +88,7 @@ def check_placed(points_px: Array, fitted: Corners, at: Array, size: tuple[int, 
 
     Nothing is known of their uncertainties but the scatter about the map, the same for all.
     """
-    same = np.repeat(np.eye(2)[None], len(at), axis=0)
+    same = np.repeat(PLACED_PX**2 * np.eye(2)[None], len(at), axis=0)
     started = replace(fitted, points_px=points_px, covariance_px2=same, consistent=np.ones(len(at), bool))
     agreed = _agreeing(started, at, size)
     good = agreed.consistent
@@ -101,6 +102,11 @@ def _weights(covariance: Array, good: Mask) -> Array:
     """(n,) inverse mean variances, relative to the median one."""
     variance = np.where(good, 0.5 * np.trace(covariance, axis1=1, axis2=2), np.inf)
     return np.median(variance[good]) / variance
+
+
+def hold_of(covariance: Array, good: Mask) -> Hold:
+    """How firmly corners with (n, 2, 2) covariances leave the lens of their map where it usually is."""
+    return Hold(float(np.sqrt(0.5 * np.median(np.trace(covariance[good], axis1=1, axis2=2)))))
 
 
 def _left_out(points: Array, board: BoardMap, at: Array, weights: Array) -> tuple[Array, Array]:

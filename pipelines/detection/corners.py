@@ -11,7 +11,7 @@ from eposit.arrays import Array, Mask
 from pipelines.detection.board_map import BoardMap, normal_angles
 from pipelines.detection.circle_shade import without_shade
 from pipelines.detection.circle_surroundings import ellipses_around_circle
-from pipelines.detection.consistency import Corners, drop_inconsistent
+from pipelines.detection.consistency import Corners, drop_inconsistent, hold_of
 from pipelines.detection.corner_blur import measured_blur, widths_beyond
 from pipelines.detection.corner_model import fit_corners
 from pipelines.detection.corner_picture import BLUR, CONTRAST, MEAN, SHAPE, SLOPE, CornerTask
@@ -128,11 +128,12 @@ def _next_map(corners: Corners, board: BoardMap, at: Array, size: tuple[int, int
     A first map is made from corners that are good to a pixel, and holds the lens to a usual one.
     """
     weights, points = corners.consistent * 1.0, corners.points_px
-    near = BoardMap.fit(at, points, size, weights, board)
+    hold = hold_of(corners.covariance_px2, corners.consistent)
+    near = BoardMap.fit(at, points, size, weights, board, hold)
     misfit, own = _misfit(corners, near, at)
-    if misfit <= MISFIT_NOISE * own:
+    if misfit <= own:
         return near
-    anew = BoardMap.fit(at, points, size, weights, lift=board.lift)
+    anew = BoardMap.fit_from_everywhere(at, points, size, weights, hold, board.lift)
     return anew if _misfit(corners, anew, at)[0] < misfit else near
 
 

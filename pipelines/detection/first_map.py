@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipelines.detection.board_map import BoardMap, grid
+from pipelines.detection.board_map import SEEN_CORNERS, BoardMap, grid
 from pipelines.detection.seen_points import SeenPoints
 from render.targets.chessboard import Chessboard
 
 CIRCLE_CLEARANCE = 1.3  # squares from the circle's foot within which a finder's corners are not trusted
 LEAST_CLEAR = 7  # corners for a map; where fewer are clear of the circle all take part
-FIRM_HOLD = 1.0  # of the lens near its start: see `BoardMap.fit`
 OUTLIER_PX = 1.5  # a worst corner farther off than this has all corners weighed by their distances
 GENTLE_PX = 0.5  # distance at which such a weight is one half
 
@@ -26,8 +25,8 @@ def first_map(seen: SeenPoints, size: tuple[int, int], target: Chessboard) -> Bo
     clear = used & (np.linalg.norm(at - target.circle_centre[:2] / target.square_mm, axis=1) > CIRCLE_CLEARANCE)
     if np.sum(clear) >= LEAST_CLEAR:
         used = clear
-    board = BoardMap.fit(at, points, size, used.astype(np.float64), hold=FIRM_HOLD)
+    board = BoardMap.fit(at, points, size, used.astype(np.float64), hold=SEEN_CORNERS)
     distance = np.linalg.norm(board(at) - points, axis=1)
     if distance[used].max() <= OUTLIER_PX:
         return board
-    return BoardMap.fit(at, points, size, used / (1.0 + (distance / GENTLE_PX) ** 2), board, FIRM_HOLD)
+    return BoardMap.fit(at, points, size, used / (1.0 + (distance / GENTLE_PX) ** 2), board, SEEN_CORNERS)

@@ -20,7 +20,8 @@ from eposit.arrays import Array
 from pipelines.detection.cholesky import solve_damped
 from pipelines.detection.kernels import compiled, compiled_part
 
-PARAMETERS = 13  # rotation 3, translation 3, lens 7
+LENS = 7
+PARAMETERS = 6 + LENS  # rotation 3, translation 3, lens
 NEWTON_STEPS = 12
 TRIES = 8
 LEAST_GAIN = 1e-4  # of the cost in one step: a hundredth of a corner; a pinhole would wander for a hundred steps
@@ -113,12 +114,12 @@ def slopes(R: Array, t: Array, lens: Array, x: Array, y: Array, z: Array, out: A
 
 
 @compiled_part
-def _cost(pixels: Array, found: Array, weights: Array, lens: Array, expected: Array, hold: Array) -> float:
+def _cost(pixels: Array, found: Array, weights: Array, lens: Array, held: Array) -> float:
     total = 0.0
     for i in range(len(pixels)):
         total += weights[i] * ((pixels[i, 0] - found[i, 0]) ** 2 + (pixels[i, 1] - found[i, 1]) ** 2)
     for k in range(1, 7):
-        total += hold[k] * (lens[k] - expected[k]) ** 2
+        total += held[1, k] * (lens[k] - held[0, k]) ** 2
     return total
 
 
@@ -143,36 +144,36 @@ def _normal_equations(
 
 @compiled
 def fit(
-    R: Array, t: Array, lens: Array, points: Array, pixels: Array, weights: Array, hold: Array, steps: int
+    R: Array, t: Array, lens: Array, points: Array, pixels: Array, weights: Array, held: Array, steps: int
 ) -> tuple[Array, Array, Array]:
     """Levenberg-Marquardt over pose and lens on (n, 2) pixels of points of the board.
 
-    points: (3, n) x, y, z. weights: (n,) inverse variances, 0 where a point takes no part. hold: (7,) weak weights that
-    keep the lens near where it starts, for what one view does not tell.
+    points: (3, n) x, y, z. weights: (n,) inverse variances, 0 where a point takes no part. held: (2, 7) a
+    usual lens, and weak weights that keep the lens near it, for what one view does not tell.
     """
     x, y, z = points[0], points[1], points[2]
-    n, expected = len(x), lens
-    R_old, t_old, R, t, lens = R, t, np.empty((3, 3)), np.empty(3), np.empty(len(lens))
-    _copy_pose(R_old, t_old, expected, R, t, lens)
+    n, R_old, t_old, lens_old = len(x), R, t, lens
+    R, t, lens = np.empty((3, 3)), np.empty(3), np.empty(len(lens_old))
+    _copy_pose(R_old, t_old, lens_old, R, t, lens)
     R_new, t_new, lens_new = np.empty((3, 3)), np.empty(3), np.empty(len(lens))
     found, trial, jacobian = np.empty((n, 2)), np.empty((n, 2)), np.empty((2 * n, PARAMETERS))
     normal, lower = np.empty((PARAMETERS, PARAMETERS)), np.empty((PARAMETERS, PARAMETERS))
     right, change = np.empty(PARAMETERS), np.empty(PARAMETERS)
     project(R, t, lens, x, y, z, found)
-    cost, damping = _cost(pixels, found, weights, lens, expected, hold), 1e-3
+    cost, damping = _cost(pixels, found, weights, lens, held), 1e-3
     for _ in range(steps):
         slopes(R, t, lens, x, y, z, jacobian)
         _normal_equations(jacobian, pixels, found, weights, normal, right)
         for k in range(1, 7):
-            normal[6 + k, 6 + k] += hold[k]
-            right[6 + k] -= hold[k] * (lens[k] - expected[k])
+            normal[6 + k, 6 + k] += held[1, k]
+            right[6 + k] -= held[1, k] * (lens[k] - held[0, k])
         gain = 0.0
         for _ in range(TRIES):
             new = np.inf
             if solve_damped(normal, right, damping, lower, change):
                 _changed(R, t, lens, change, R_new, t_new, lens_new)
                 project(R_new, t_new, lens_new, x, y, z, trial)
-                new = _cost(pixels, trial, weights, lens_new, expected, hold)
+                new = _cost(pixels, trial, weights, lens_new, held)
             if new <= cost:
                 gain = (cost - new) / cost if cost > 0.0 else 0.0
                 _copy_pose(R_new, t_new, lens_new, R, t, lens)
@@ -227,4 +228,4 @@ def prepare() -> None:
     project(R, t, lens, at, at, at, np.empty((2, 2)))
     slopes(R, t, lens, at, at, at, np.empty((4, PARAMETERS)))
     meet_planes(R, t, lens, at, at, at, np.empty((2, 2, 2, 2)))
-    fit(R, t, lens, np.zeros((3, 2)), np.zeros((2, 2)), np.ones(2), np.ones(7), 1)
+    fit(R, t, lens, np.zeros((3, 2)), np.zeros((2, 2)), np.ones(2), np.ones((2, LENS)), 1)

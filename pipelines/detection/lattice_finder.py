@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eposit.arrays import Array
-from pipelines.detection.board_map import BoardMap
-from pipelines.detection.first_map import FIRM_HOLD
+from pipelines.detection.board_map import SEEN_CORNERS, BoardMap
 from pipelines.detection.generic_lens import PARAMETERS
 from pipelines.detection.grid_steps import axes
 from pipelines.detection.identity import AnyChessboard, Placement, identify
@@ -157,7 +156,7 @@ def _map(grid: Grid, level: LevelOf) -> BoardMap | None:
     at, size = np.stack((x, y), axis=1).astype(np.float64), (level.grey.shape[1], level.grey.shape[0])
     try:
         points = np.ascontiguousarray(grid.points[y, x])  # in another layout the fit would be compiled anew
-        return BoardMap.fit(at, points, size, np.ones(len(at)), hold=FIRM_HOLD)
+        return BoardMap.fit(at, points, size, np.ones(len(at)), hold=SEEN_CORNERS)
     except np.linalg.LinAlgError:
         return None
 

@@ -13,7 +13,7 @@ from pipelines.detection.consistency import Corners, check_placed
 from pipelines.detection.corner_sites import CornerSites
 from pipelines.detection.corners import refine_corners
 from pipelines.detection.finders import find_board, subpix
-from pipelines.detection.first_map import FIRM_HOLD, OUTLIER_PX
+from pipelines.detection.first_map import OUTLIER_PX, SEEN_CORNERS
 from pipelines.detection.grey_picture import Grey
 from pipelines.detection.markers import find_aprilgrid, find_charuco
 from pipelines.detection.seen_points import SeenPoints
@@ -114,11 +114,11 @@ def _first_map(seen: SeenPoints, at: Array, size: tuple[int, int], lift: Lift | 
     """The map through what was seen, of which some may be a few pixels off."""
     points, weights = np.zeros((len(at), 2)), np.zeros(len(at))
     points[seen.ids], weights[seen.ids] = seen.points_px, 1.0
-    board = BoardMap.fit(at, points, size, weights, hold=FIRM_HOLD, lift=lift)
+    board = BoardMap.fit(at, points, size, weights, hold=SEEN_CORNERS, lift=lift)
     distance = np.linalg.norm(board(at) - points, axis=1)
     if distance[seen.ids].max() <= OUTLIER_PX:
         return board
-    return BoardMap.fit(at, points, size, weights / (1.0 + (distance / GENTLE_PX) ** 2), board, FIRM_HOLD)
+    return BoardMap.fit(at, points, size, weights / (1.0 + (distance / GENTLE_PX) ** 2), board, SEEN_CORNERS)
 
 
 def _is_inside(points: Array, size: tuple[int, int]) -> Mask:

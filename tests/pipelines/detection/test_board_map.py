@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipelines.detection.board_map import BoardMap, grid, normal_angles
+from pipelines.detection.board_map import SEEN_CORNERS, BoardMap, Hold, grid, normal_angles
 from tests.cameras import COEFFICIENTS, RADIUS
 
 INNER, SIZE = (9, 6), (1600, 1200)
@@ -126,6 +126,40 @@ def test_one_fit_arrives():
         misses.append(np.linalg.norm(board(CORNERS) - pixels, axis=1).max())
     # A tenth of a pixel is ten times the noise of a corner. One in a hundred would not matter: there are two more fits.
     assert np.mean(np.array(misses) > 0.1) < 0.01
+
+
+def test_all_starts_together_arrive_where_fy_is_nearly_twice_fx():
+    """Far boards, tilted up to 63 degrees, through a pinhole lens; the first map knows their corners to 0.3 px."""
+    rng, size, deviation, left, near_left = np.random.default_rng(0), (641, 479), 0.003, [], []
+    while len(left) < 20:
+        R = Rotation.from_euler("xyz", rng.uniform([-60, -60, -180], [60, 60, 180]), degrees=True).as_matrix()
+        middle = rng.uniform([-2.0, -2.0, 20.0], [2.0, 2.0, 80.0])
+        points = (np.column_stack((CORNERS, np.zeros(54))) - [4.0, 2.5, 0.0]) @ R.T + middle
+        if abs(R[:, 2] @ middle) < 0.45 * np.linalg.norm(middle):
+            continue
+        exact = points[:, :2] / points[:, 2:] * [500.0, 900.0] + [321.0, 238.0]
+        seen = BoardMap.fit(CORNERS, exact + rng.normal(0.0, 0.3, exact.shape), size, np.ones(54), hold=SEEN_CORNERS)
+        pixels = exact + rng.normal(0.0, deviation, exact.shape)
+        near = BoardMap.fit(CORNERS, pixels, size, np.ones(54), seen, Hold(deviation))
+        board = BoardMap.fit_from_everywhere(CORNERS, pixels, size, np.ones(54), Hold(deviation))
+        freedom = 2 * len(CORNERS) - 13
+        left.append(np.sum((board(CORNERS) - pixels) ** 2) / deviation**2 / freedom)
+        near_left.append(np.sum((near(CORNERS) - pixels) ** 2) / deviation**2 / freedom)
+    # A chi-square of 95 degrees of freedom is above 1.6 of them once in 7000; the wrong valleys leave 3 to 3000.
+    assert np.max(left) < 1.6
+    assert np.median(near_left) > 1.6  # or else these boards show nothing
+
+
+def test_fits_upon_fits_do_not_move_the_lens_along_what_a_far_board_does_not_tell():
+    rng, size = np.random.default_rng(1), (641, 479)
+    R = Rotation.from_euler("xyz", (20, 10, 5), degrees=True).as_matrix()
+    points = (np.column_stack((CORNERS, np.zeros(54))) - [4.0, 2.5, 0.0]) @ R.T + [0.0, 0.0, 60.0]
+    pixels = points[:, :2] / points[:, 2:] * 700.0 + [321.0, 238.0] + rng.normal(0.0, 0.02, (54, 2))
+    board = None
+    for _ in range(10):
+        board = BoardMap.fit(CORNERS, pixels, size, np.ones(54), board, Hold(0.02))
+    # Three spreads of usual lenses; held a thousand times more weakly, k3 is -20 here.
+    assert np.abs(board.lens[4:]).max() < 3.0 * Hold().bend
 
 
 @pytest.mark.parametrize("pose", ["near", "wide"])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pipelines.detection.board_fit import fit_board
-from pipelines.detection.board_map import BoardMap, grid
+from pipelines.detection.board_map import SEEN_CORNERS, BoardMap, grid
 from pipelines.detection.corner_scatter import orthonormal
 from pipelines.detection.corner_sites import REACH, CornerSites
 from pipelines.detection.corners import refine_corners
@@ -104,7 +104,7 @@ def measured(square_px):
     errors, normalised = [], []
     for draw in range(DRAWS):
         rng = np.random.default_rng(draw)
-        first = BoardMap.fit(at, truth + rng.uniform(-0.3, 0.3, truth.shape), size, np.ones(len(at)), hold=1.0)
+        first = BoardMap.fit(at, truth + rng.uniform(-0.3, 0.3, truth.shape), size, np.ones(len(at)), hold=SEEN_CORNERS)
         found = refine_corners(digitised(image, rng, NOISE), first, CornerSites(at, sense))
         assert found.consistent.all()
         fit = fit_board(found, at)

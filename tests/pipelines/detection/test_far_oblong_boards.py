@@ -7,22 +7,22 @@ from datasets.store.dataset import open_dataset
 
 RECIPE = """\
 name = "oblong"
-description = "far boards through a lens whose pixels are 1.45 times as high as wide"
+description = "far boards through a lens whose pixels are no squares"
 seed = 21
 quality = "draft"
 
 [trajectory]
 kind = "scatter"
 count = 24
-depth_range_mm = [2900, 4000]
+depth_range_mm = [{nearest}, 4000]
 offset_range_mm = [0, 120]
-tilt_range_deg = [0, 35]
+tilt_range_deg = [0, {tilt}]
 
 [[cameras]]
 name = "oblong"
 lens = "perspective"
-fx = 890.0
-fy = 614.0
+fx = {fx}
+fy = {fy}
 cx = 321
 cy = 238.5
 width = 641
@@ -32,9 +32,10 @@ nominal_f = 750
 
 
 @pytest.mark.full
-def test_circles_lie_within_their_errors(tmp_path, cli):
+@pytest.mark.parametrize(("fx", "fy", "nearest", "tilt"), [(890, 614, 2900, 35), (500, 900, 1200, 60)])
+def test_circles_lie_within_their_errors(tmp_path, cli, fx, fy, nearest, tilt):
     recipe, root = tmp_path / "oblong.toml", tmp_path / "out"
-    recipe.write_text(RECIPE)
+    recipe.write_text(RECIPE.format(fx=fx, fy=fy, nearest=nearest, tilt=tilt))
     assert cli("generate", recipe, "--out", root, "--quiet").code == 0
     assert cli("detect", root, "--quiet").code == 0
     dataset = open_dataset(root)
