@@ -284,7 +284,8 @@ class Expressions(ast.NodeVisitor):
     def _extreme(self, name: str, values: list[Value], node: ast.AST) -> Value:
         """As Python: the first of two, unless the second is beyond it."""
         first, second = values
-        return self._chosen(self._compared(ast.Lt() if name == "min" else ast.Gt(), second, first, node), second, first, node)
+        beyond = self._compared(ast.Lt() if name == "min" else ast.Gt(), second, first, node)
+        return self._chosen(beyond, second, first, node)
 
     def _chosen(self, test: Value, yes: Value, no: Value, node: ast.AST) -> Value:
         """One of two values that are both computed."""

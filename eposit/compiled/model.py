@@ -16,7 +16,6 @@ from eposit.compiled.kernel import NUMBER, NUMBERS, WHOLE, W, compiled, four, pa
 from eposit.compiled.layout import INFO, INFO_STEP, POINTS, SEEN
 from eposit.compiled.lens import radial_of_four
 
-
 THREE = (NUMBERS, NUMBERS, NUMBERS)
 
 
