@@ -25,7 +25,7 @@ from eposit.compiled.layout import (
 from eposit.pose import Pose
 from eposit.solution import Alternatives, Solution, Status, status_names
 
-CHUNK = 4096  # images whose rows stay in the processor's cache
+CHUNK = 512  # images whose rows stay in the processor's cache
 BLOCKS = ((0, POSE), (POSE, POSE + 9), (POSE + 9, COVARIANCE), (COVARIANCE, OTHERS), (OTHERS, RESULT))
 NO_COVARIANCE = np.broadcast_to(np.nan, (6, 6))
 NO_ALTERNATIVES = Alternatives.none()
@@ -57,12 +57,12 @@ def solve_batch(run: Run, pixels: Array, width: int, variance: float) -> Solutio
     """The solutions of (b, n, 2) image points. variance: what their costs are to be divided by."""
     b, n = pixels.shape[:2]
     blocks = [np.empty((b, stop - start)) for start, stop in BLOCKS if stop <= width]
+    out = np.empty((min(b, CHUNK), width))
     for start in range(0, b, CHUNK):
         part = pixels[start : start + CHUNK]
-        out = np.empty((len(part), width))
         run(part, out)
         for block, (first, stop) in zip(blocks, BLOCKS, strict=False):
-            block[start : start + CHUNK] = out[:, first:stop]
+            block[start : start + CHUNK] = out[: len(part), first:stop]
     numbers, R, t, *rest = blocks
     status, pose = status_names(numbers[:, STATUS].astype(np.int8)), Pose(R.reshape(b, 3, 3), t)
     iterations, rmse, cost = numbers[:, ITERATIONS].astype(np.int64), numbers[:, RMSE].copy(), numbers[:, PRICE].copy()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from eposit.compiled.descent import moved
+from eposit.compiled.departure import departure
 from eposit.compiled.kernel import NOTHING, NUMBER, POINTER, TRUTH, WHOLE, W, compiled
 from eposit.compiled.layout import (
     ALTERNATIVES,
@@ -17,22 +17,18 @@ from eposit.compiled.layout import (
     ITERATIONS,
     KNOWN,
     MINIMA,
-    MOVE,
     OTHER,
     OTHERS,
     POSE,
     PRICE,
-    PROPOSAL,
     RESULT,
     RMSE,
-    SCRATCH,
     SIZE,
     STATUS,
     STEPS,
     UNRELIABLE,
 )  # fmt: skip
 from eposit.compiled.linear6 import inverse
-from eposit.compiled.model import cost_at
 from eposit.compiled.observe import (
     COPLANAR,
     NOT_CONVERGED,
@@ -50,69 +46,6 @@ from eposit.compiled.shape import DESCRIBED, ON_A_LINE, describe
 
 IMAGE_CIRCLE_ALLOWANCE = 0.05  # share of the radius by which noise may lift a point over the image circle
 FLOOR_PX = 1e-6  # RMSE that counts as rounding when costs are compared
-DEVIATIONS = 3.0  # standard deviations from the minimum at which the cost is compared with its parabola
-POWER_STEPS = 4
-WEAK, LEAST = SCRATCH, SCRATCH + 12  # (2, 6) steps along the least known rotations; least ratio along each
-LEAST_RATIO = 0.25  # by which the covariance is widened at most; it counts as unreliable long before
-
-
-@compiled(NOTHING, W, WHOLE)
-def weak_step(w, k):
-    """At WEAK + 6 k a step of one standard deviation along the least known rotation (k = 0), or along the least known
-    of those that are independent of it (k = 1). The inverse Hessian is at HESSIAN.
-
-    The power method on the covariance of the rotation; any direction of large variance will do.
-    """
-    C, step = HESSIAN, WEAK + 6 * k
-    x, y, z = 1.0, 1.0, 1.0
-    p, q, r = w[WEAK], w[WEAK + 1], w[WEAK + 2]
-    if k == 1:  # at right angles to the first
-        x, y, z = q - r, r - p, p - q
-    for _ in range(POWER_STEPS):
-        a = w[C] * x + w[C + 1] * y + w[C + 2] * z
-        b = w[C + 6] * x + w[C + 7] * y + w[C + 8] * z
-        c = w[C + 12] * x + w[C + 13] * y + w[C + 14] * z
-        if k == 1:
-            along = (p * a + q * b + r * c) / (p * p + q * q + r * r)
-            a, b, c = a - along * p, b - along * q, c - along * r
-        size = math.sqrt(a * a + b * b + c * c)
-        x, y, z = a / size, b / size, c / size
-    for i in range(6):
-        w[step + i] = w[C + 6 * i] * x + w[C + 6 * i + 1] * y + w[C + 6 * i + 2] * z
-    size = math.sqrt(w[step] * x + w[step + 1] * y + w[step + 2] * z)
-    for i in range(6):
-        w[step + i] /= size
-
-
-@compiled(NUMBER, W, WHOLE, NUMBER)
-def departure(w, n, variance):
-    """How far the cost is from its parabola along the two least known rotations: the largest |log| of their ratio in
-    eight directions.
-
-    The inverse Hessian is at HESSIAN; it grows along each of the two so that it states no more than the cost does.
-    variance: of residuals of unit weight.
-    """
-    weak_step(w, 0)
-    weak_step(w, 1)
-    worst, expected = 0.0, DEVIATIONS * DEVIATIONS * variance
-    w[LEAST] = w[LEAST + 1] = 1.0
-    for side in range(8):
-        angle = 0.25 * math.pi * side
-        first, second = math.cos(angle) * math.sqrt(expected), math.sin(angle) * math.sqrt(expected)
-        for i in range(6):
-            w[MOVE + i] = first * w[WEAK + i] + second * w[WEAK + 6 + i]
-        moved(w, MINIMA, MOVE, PROPOSAL)
-        ratio = (cost_at(w, n, PROPOSAL) - w[COSTS]) / expected
-        worst = max(worst, abs(math.log(ratio)) if ratio > 0.0 else math.inf)
-        if side % 2 == 0:
-            axis = LEAST + side // 2 % 2
-            w[axis] = max(min(w[axis], ratio), LEAST_RATIO)
-    for k in range(2):
-        grow = 1.0 / w[LEAST + k] - 1.0
-        for i in range(6):
-            for j in range(6):
-                w[HESSIAN + 6 * i + j] += grow * w[WEAK + 6 * k + i] * w[WEAK + 6 * k + j]
-    return worst
 
 
 @compiled(NOTHING, W, NUMBER, POINTER, WHOLE)
@@ -144,13 +77,12 @@ def write_covariance(w, scale, out, place):
 @compiled(NOTHING, W, WHOLE, POINTER, WHOLE)
 def write_others(w, known, out, place):
     """At `place` of out the minima after the lowest of `known`, then NaN."""
-    for k in range(ALTERNATIVES):
-        pose, there = MINIMA + 12 * (k + 1), place + OTHER * k
-        if k + 1 >= known:
-            no_pose(w, pose)
-            w[COSTS + k + 1] = math.nan
-        write_pose(w, pose, out, there)
-        out[there + 12] = w[COSTS + k + 1]
+    told = max(min(known - 1, ALTERNATIVES), 0)
+    for k in range(told):
+        write_pose(w, MINIMA + 12 * (k + 1), out, place + OTHER * k)
+        out[place + OTHER * k + 12] = w[COSTS + k + 1]
+    for i in range(place + OTHER * told, place + OTHER * ALTERNATIVES):
+        out[i] = math.nan
 
 
 @compiled(TRUTH, W, WHOLE, NUMBER, NUMBER)

@@ -111,14 +111,6 @@ def _kick(w, n, pose, L, bad, size):
             w[PROPOSAL + i], w[TWIN + i] = w[TWIN + i], w[PROPOSAL + i]
 
 
-@compiled(NOTHING, W, WHOLE)
-def _accept(w, pose):
-    """The proposal becomes the pose, its derivatives those of the pose."""
-    copy(w, GRADIENT_NEW, GRADIENT, 6)
-    copy(w, HESSIAN_NEW, HESSIAN, 36)
-    copy(w, PROPOSAL, pose, 12)
-
-
 @compiled(NOTHING, W, WHOLE, WHOLE, NUMBER, NUMBER)
 def _finish(w, n, pose, cost, floor):
     """The last step is taken unless it raises the cost; at COST what it then is."""
@@ -141,22 +133,23 @@ def descend(w, n, pose, count, L, newton):
     before, kicks, floor = math.inf, 0, w[FLOOR]
     damping = FIRST_DAMPING if newton == 0.0 else 0.0
     w[TWIN] = math.nan
-    cost = derivatives(w, n, pose, newton, GRADIENT, HESSIAN)
+    g, H, g_new, H_new = GRADIENT, HESSIAN, GRADIENT_NEW, HESSIAN_NEW
+    cost = derivatives(w, n, pose, newton, g, H)
     for step in range(1, MAX_STEPS + 1):
         if not cost < math.inf:
             break
         w[STEPS] += 1.0
-        bad = factorise(w, HESSIAN, damping, L)
-        solve(w, L, GRADIENT, MOVE)
+        bad = factorise(w, H, damping, L)
+        solve(w, L, g, MOVE)
         size, gain = _size(w, pose), 0.0
         for i in range(6):
-            gain -= w[GRADIENT + i] * w[MOVE + i]
+            gain -= w[g + i] * w[MOVE + i]
         settled = gain <= GAIN_TOL * cost + floor
         kicked = False
         if newton == 0.0:
             if settled:  # the Hessian decides whether this is a minimum
                 newton, damping = 1.0, 0.0
-                cost = derivatives(w, n, pose, newton, GRADIENT, HESSIAN)
+                cost = derivatives(w, n, pose, newton, g, H)
                 continue
         elif bad < 6:
             kicked = settled  # a saddle
@@ -177,9 +170,10 @@ def descend(w, n, pose, count, L, newton):
         else:
             moved(w, pose, MOVE, PROPOSAL)
         newton_new = 1.0 if size < NEAR or step >= SLOW else 0.0
-        cost_new = derivatives(w, n, PROPOSAL, newton_new, GRADIENT_NEW, HESSIAN_NEW)
+        cost_new = derivatives(w, n, PROPOSAL, newton_new, g_new, H_new)
         if cost_new <= _limit(cost, floor):
-            _accept(w, pose)
+            copy(w, PROPOSAL, pose, 12)
+            g, H, g_new, H_new = g_new, H_new, g, H
             cost, newton, before = cost_new, newton_new, size
             damping = 0.1 * damping if damping > 10.0 * LEAST_DAMPING else 0.0
             if is_known(w, pose, count) == 1:

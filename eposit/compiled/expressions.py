@@ -7,7 +7,7 @@ import math
 import struct
 from typing import Any, NamedTuple
 
-from eposit.compiled.kernel import NUMBER, POINTER, TRUTH, WHOLE, Kernel, Returns
+from eposit.compiled.kernel import LANES, NUMBER, NUMBERS, POINTER, TRUTH, TRUTHS, WHOLE, Kernel, Returns
 
 # Functions of numbers: name in the assembly language, number of arguments. The C library has those without `llvm`.
 FUNCTIONS = {
@@ -15,6 +15,7 @@ FUNCTIONS = {
     "sin": ("sin", 1), "cos": ("cos", 1), "tan": ("tan", 1), "acos": ("acos", 1), "atan": ("atan", 1),
     "atan2": ("atan2", 2), "log": ("log", 1), "pow": ("pow", 2),
 }  # fmt: skip
+FUNCTIONS_OF_FOUR = {"sqrt": "llvm.sqrt.v4f64", "abs": "llvm.fabs.v4f64"}
 LIBRARY = tuple(name for name, _ in FUNCTIONS.values() if "." not in name)
 OPERATIONS = {
     ast.Add: ("add", "fadd"), ast.Sub: ("sub", "fsub"), ast.Mult: ("mul", "fmul"), ast.FloorDiv: ("sdiv", ""),
@@ -102,7 +103,20 @@ class Expressions(ast.NodeVisitor):
             if value.text.lstrip("-").isdigit():
                 return literal(float(value.text)).text
             return self.assigned(NUMBER, f"sitofp i64 {value.text} to double").text
+        if kind == NUMBERS and value.kind in (NUMBER, WHOLE):
+            return self.lanes([self.as_kind(value, NUMBER, node)] * LANES).text
         return self.refuse(node, f"is of type {value.kind} where {kind} is wanted")
+
+    def lanes(self, operands: list[str]) -> Value:
+        """Four numbers side by side."""
+        whole = "poison"
+        for i, operand in enumerate(operands):
+            whole = self.assigned(NUMBERS, f"insertelement {NUMBERS} {whole}, double {operand}, i64 {i}").text
+        return Value(NUMBERS, whole)
+
+    def lane(self, value: Value, i: str) -> Value:
+        """One of four numbers."""
+        return self.assigned(NUMBER, f"extractelement {NUMBERS} {value.text}, i64 {i}")
 
     def refuse(self, node: ast.AST, why: str) -> Any:
         """Stop with the place in the source."""
@@ -133,15 +147,18 @@ class Expressions(ast.NodeVisitor):
         return tuple(self.value(part) for part in node.elts)
 
     def visit_Subscript(self, node: ast.Subscript) -> Value:
-        """A number of an array, or one of the values that a function returns."""
+        """A number of an array or of four, or one of the values that a function returns."""
         if isinstance(node.value, ast.Call):
             assert isinstance(node.slice, ast.Constant)
             return self.visit(node.value)[node.slice.value]
-        return self.assigned(NUMBER, f"load double, ptr {self.place(node)}")
+        array = self.value(node.value)
+        if array.kind == NUMBERS:
+            return self.lane(array, self.as_kind(self.value(node.slice), WHOLE, node))
+        return self.assigned(NUMBER, f"load double, ptr {self.place(node, array)}")
 
-    def place(self, node: ast.Subscript) -> str:
+    def place(self, node: ast.Subscript, array: Value) -> str:
         """The address of a number of an array."""
-        array, index = self.value(node.value), self.value(node.slice)
+        index = self.value(node.slice)
         base, index = self.as_kind(array, POINTER, node), self.as_kind(index, WHOLE, node)
         return self.assigned(POINTER, f"getelementptr double, ptr {base}, i64 {index}").text
 
@@ -152,8 +169,8 @@ class Expressions(ast.NodeVisitor):
             return self.assigned(TRUTH, f"xor i1 {self.as_kind(value, TRUTH, node)}, true")
         if not isinstance(node.op, ast.USub):
             self.generic_visit(node)
-        if value.kind == NUMBER:
-            return self.assigned(NUMBER, f"fneg double {value.text}")
+        if value.kind in (NUMBER, NUMBERS):
+            return self.assigned(value.kind, f"fneg {value.kind} {value.text}")
         return self.assigned(WHOLE, f"sub i64 0, {self.as_kind(value, WHOLE, node)}")
 
     def visit_BinOp(self, node: ast.BinOp) -> Value:
@@ -167,7 +184,7 @@ class Expressions(ast.NodeVisitor):
         if type(operator) not in OPERATIONS:
             self.generic_visit(node)
         for_whole, for_numbers = OPERATIONS[type(operator)]
-        kind = WHOLE if for_whole and (left.kind, right.kind) == (WHOLE, WHOLE) else NUMBER
+        kind = _common(left, right, whole=bool(for_whole))
         name = for_whole if kind == WHOLE else for_numbers
         if not name:
             self.refuse(node, "has an operation that its numbers do not have")
@@ -176,10 +193,10 @@ class Expressions(ast.NodeVisitor):
 
     def _power(self, node: ast.BinOp) -> Value:
         """A square as a product, else by the C library."""
-        base = self.as_kind(self.value(node.left), NUMBER, node)
+        base = self.value(node.left)
         if isinstance(node.right, ast.Constant) and node.right.value == 2:
-            return self.assigned(NUMBER, f"fmul double {base}, {base}")
-        return self._call_number("pow", [base, self.as_kind(self.value(node.right), NUMBER, node)])
+            return self.operation(ast.Mult(), base, base if base.kind != WHOLE else self._number(base, node), node)
+        return self._call_number("pow", [base, self.value(node.right)], node)
 
     def visit_Compare(self, node: ast.Compare) -> Value:
         """One or several comparisons, and `in` of a tuple."""
@@ -201,10 +218,11 @@ class Expressions(ast.NodeVisitor):
 
     def _compared(self, operator: ast.cmpop, left: Value, right: Value, node: ast.AST) -> Value:
         signed, ordered = COMPARISONS[type(operator)]
-        if (left.kind, right.kind) == (WHOLE, WHOLE):
+        kind = _common(left, right)
+        if kind == WHOLE:
             return self.assigned(TRUTH, f"icmp {signed} i64 {left.text}, {right.text}")
-        a, b = self.as_kind(left, NUMBER, node), self.as_kind(right, NUMBER, node)
-        return self.assigned(TRUTH, f"fcmp {ordered} double {a}, {b}")
+        a, b = self.as_kind(left, kind, node), self.as_kind(right, kind, node)
+        return self.assigned(TRUTHS if kind == NUMBERS else TRUTH, f"fcmp {ordered} {kind} {a}, {b}")
 
     def visit_BoolOp(self, node: ast.BoolOp) -> Value:
         """`and` and `or`: what follows is left out where the first values decide."""
@@ -221,9 +239,12 @@ class Expressions(ast.NodeVisitor):
         return self.assigned(TRUTH, f"load i1, ptr {place}")
 
     def visit_IfExp(self, node: ast.IfExp) -> Value:
-        """One of two values of the same type; the other is not computed."""
+        """One of two values of the same type; the other is not computed. In each of four lanes its own one of both."""
+        truth = self.value(node.test)
+        if truth.kind == TRUTHS:
+            return self._chosen(truth, self.value(node.body), self.value(node.orelse), node)
         yes, no, end = self.fresh(), self.fresh(), self.fresh()
-        test = self.as_kind(self.value(node.test), TRUTH, node)
+        test = self.as_kind(truth, TRUTH, node)
         self.line(f"br i1 {test}, label %{yes}, label %{no}")
         self.line(f"{yes}:")
         value = self.value(node.body)
@@ -244,14 +265,18 @@ class Expressions(ast.NodeVisitor):
         values = [self.value(argument) for argument in node.args]
         if name == "int":
             return self.assigned(WHOLE, f"fptosi double {self.as_kind(values[0], NUMBER, node)} to i64")
+        if name == "four":
+            return self.lanes([self.as_kind(value, NUMBER, node) for value in values])
         if name in ("min", "max"):
             return self._extreme(name, values, node)
         if name not in FUNCTIONS:
             self.refuse(node, "calls what no kernel can call; see eposit.compiled.translate")
-        return self._call_number(name, [self.as_kind(value, NUMBER, node) for value in values])
+        return self._call_number(name, values, node)
 
-    def _call_number(self, name: str, operands: list[str]) -> Value:
-        called = FUNCTIONS[name][0]
+    def _call_number(self, name: str, values: list[Value], node: ast.AST) -> Value:
+        if values[0].kind == NUMBERS and name in FUNCTIONS_OF_FOUR:
+            return self.assigned(NUMBERS, f"call {NUMBERS} @{FUNCTIONS_OF_FOUR[name]}({NUMBERS} {values[0].text})")
+        operands, called = [self.as_kind(value, NUMBER, node) for value in values], FUNCTIONS[name][0]
         built_in = "nobuiltin" if called in LIBRARY else ""  # LLVM knows its name, and would exchange it for another
         given = ", ".join(f"double {operand}" for operand in operands)
         return self.assigned(NUMBER, f"call double @{called}({given}) {built_in}")
@@ -259,17 +284,38 @@ class Expressions(ast.NodeVisitor):
     def _extreme(self, name: str, values: list[Value], node: ast.AST) -> Value:
         """As Python: the first of two, unless the second is beyond it."""
         first, second = values
-        kind = WHOLE if first.kind == second.kind == WHOLE else NUMBER
-        a, b = self.as_kind(first, kind, node), self.as_kind(second, kind, node)
-        beyond = self._compared(ast.Lt() if name == "min" else ast.Gt(), Value(kind, b), Value(kind, a), node)
-        return self.assigned(kind, f"select i1 {beyond.text}, {kind} {b}, {kind} {a}")
+        beyond = self._compared(ast.Lt() if name == "min" else ast.Gt(), second, first, node)
+        return self._chosen(beyond, second, first, node)
+
+    def _chosen(self, test: Value, yes: Value, no: Value, node: ast.AST) -> Value:
+        """One of two values that are both computed."""
+        kind = NUMBERS if test.kind == TRUTHS else _common(yes, no)
+        a, b = self.as_kind(yes, kind, node), self.as_kind(no, kind, node)
+        return self.assigned(kind, f"select {test.kind} {test.text}, {kind} {a}, {kind} {b}")
+
+    def _number(self, value: Value, node: ast.AST) -> Value:
+        return Value(NUMBER, self.as_kind(value, NUMBER, node))
 
     def _call_kernel(self, node: ast.Call, kernel: Kernel) -> Values:
+        """Once, or once for each lane where four numbers are given for one."""
         self.called.append(kernel)
         if len(node.args) != len(kernel.arguments):
             self.refuse(node, f"has {len(node.args)} arguments; the kernel takes {len(kernel.arguments)}")
-        kinds = zip(node.args, kernel.arguments, strict=True)
-        given = ", ".join(f"{kind} {self.as_kind(self.value(one), kind, node)}" for one, kind in kinds)
+        values = [self.value(one) for one in node.args]
+        wide = [value.kind == NUMBERS != kind for value, kind in zip(values, kernel.arguments, strict=True)]
+        if not any(wide):
+            return self._call_once(values, kernel, node)
+        found: list[tuple[Value, ...]] = []
+        for i in range(LANES):
+            own = [self.lane(value, str(i)) if split else value for value, split in zip(values, wide, strict=True)]
+            one = self._call_once(own, kernel, node)
+            found.append((one,) if isinstance(one, Value) else one)
+        whole = tuple(self.lanes([one.text for one in same]) for same in zip(*found, strict=True))
+        return whole[0] if len(whole) == 1 else whole
+
+    def _call_once(self, values: list[Value], kernel: Kernel, node: ast.AST) -> Values:
+        kinds = zip(values, kernel.arguments, strict=True)
+        given = ", ".join(f"{kind} {self.as_kind(value, kind, node)}" for value, kind in kinds)
         call = f'call {llvm_type(kernel.returns)} @"{kernel.name}"({given})'
         if isinstance(kernel.returns, str):
             if kernel.returns != "void":
@@ -279,3 +325,10 @@ class Expressions(ast.NodeVisitor):
         whole = self.assigned("struct", call).text
         kind = llvm_type(kernel.returns)
         return tuple(self.assigned(one, f"extractvalue {kind} {whole}, {i}") for i, one in enumerate(kernel.returns))
+
+
+def _common(a: Value, b: Value, whole: bool = True) -> str:
+    """The type of two values together."""
+    if NUMBERS in (a.kind, b.kind):
+        return NUMBERS
+    return WHOLE if whole and a.kind == b.kind == WHOLE else NUMBER

@@ -20,7 +20,7 @@ from eposit.compiled.calibrated_lens import (
     polynomial_radial,
     polynomial_ray,
 )
-from eposit.compiled.kernel import NUMBER, W, compiled, part
+from eposit.compiled.kernel import NUMBER, W, compiled, four_at_once, part
 from eposit.compiled.layout import (
     EQUISOLID,
     EUCM,
@@ -51,9 +51,7 @@ def radial(w, q, z):
     """s, and its derivatives by q, z, qq, qz, zz. Infinite where the lens has no image."""
     kind = w[LENS]
     if kind == PERSPECTIVE:
-        if not z > 0.0:
-            return math.inf, 0.0, 0.0, 0.0, 0.0, 0.0
-        s = 1.0 / z
+        s = 1.0 / z if z > 0.0 else math.inf
         return s, 0.0, -s * s, 0.0, 0.0, 2.0 * s * s * s
     if kind >= POLYNOMIAL:
         return calibrated_radial(w, q, z)
@@ -80,6 +78,9 @@ def radial(w, q, z):
     s_qz = -0.5 * (s_q * k * i2 + 0.5 * s * i * i2 - s * k * i2 * i2)
     s_zz = -0.5 * (s_z * k * i2 + s * k * i * i2 - 2.0 * s * k * z * i2 * i2)
     return s, s_q, s_z, -0.25 * (s_q * u + s * u_q), s_qz, s_zz
+
+
+radial_of_four = four_at_once(radial)  # of four points side by side
 
 
 @compiled(TWO, W, NUMBER)

@@ -4,34 +4,66 @@ A pose is 12 numbers: R row by row, then t. It changes by a rotation vector appl
 (rad), then a translation: six numbers in this order. The cost is the sum over the points of d^T P d, where d is
 projection minus observation over the focal length and P, given as (xx, xy, yy), the inverse covariance of the point
 in that unit.
+
+Four points at a time are taken side by side, each in its lane. Lanes beyond the last point repeat it without weight.
 """
 
 from __future__ import annotations
 
 import math
 
-from eposit.compiled.kernel import NUMBER, WHOLE, W, compiled
+from eposit.compiled.kernel import NUMBER, NUMBERS, WHOLE, W, compiled, four, part, total
 from eposit.compiled.layout import INFO, INFO_STEP, POINTS, SEEN
-from eposit.compiled.lens import radial
+from eposit.compiled.lens import radial_of_four
+
+THREE = (NUMBERS, NUMBERS, NUMBERS)
+
+
+@part(THREE, W, WHOLE, WHOLE)
+def _points(w, first, n):
+    """The object points from `first` on: their coordinates."""
+    a, end = POINTS + 3 * first, POINTS + 3 * n - 3
+    b, c, d = min(a + 3, end), min(a + 6, end), min(a + 9, end)
+    x, y = four(w[a], w[b], w[c], w[d]), four(w[a + 1], w[b + 1], w[c + 1], w[d + 1])
+    return x, y, four(w[a + 2], w[b + 2], w[c + 2], w[d + 2])
+
+
+@part((NUMBERS, NUMBERS), W, WHOLE, WHOLE)
+def _seen(w, first, n):
+    """The image points from `first` on."""
+    a, end = POINTS + SEEN * n + 2 * first, POINTS + SEEN * n + 2 * n - 2
+    b, c, d = min(a + 2, end), min(a + 4, end), min(a + 6, end)
+    return four(w[a], w[b], w[c], w[d]), four(w[a + 1], w[b + 1], w[c + 1], w[d + 1])
+
+
+@part(THREE, W, WHOLE, WHOLE)
+def _weights(w, first, n):
+    """Their inverse covariances, as (xx, xy, yy)."""
+    a, step = POINTS + INFO * n + int(w[INFO_STEP]) * first, int(w[INFO_STEP])
+    b = a + step if first + 1 < n else a
+    c = b + step if first + 2 < n else b
+    d = c + step if first + 3 < n else c
+    there = four(1.0, 1.0 if first + 1 < n else 0.0, 1.0 if first + 2 < n else 0.0, 1.0 if first + 3 < n else 0.0)
+    p00, p01 = four(w[a], w[b], w[c], w[d]), four(w[a + 1], w[b + 1], w[c + 1], w[d + 1])
+    return there * p00, there * p01, there * four(w[a + 2], w[b + 2], w[c + 2], w[d + 2])
 
 
 @compiled(NUMBER, W, WHOLE, WHOLE)
 def cost_at(w, n, pose):
     """The cost of the pose at place `pose`; infinite where a point has no image."""
-    o, e, j = POINTS, POINTS + SEEN * n, POINTS + INFO * n
-    step, total = int(w[INFO_STEP]), 0.0
-    for _ in range(n):
-        a, b, c = w[o], w[o + 1], w[o + 2]
+    cost = four(0.0, 0.0, 0.0, 0.0)
+    for first in range(0, n, 4):
+        a, b, c = _points(w, first, n)
         x = w[pose] * a + w[pose + 1] * b + w[pose + 2] * c + w[pose + 9]
         y = w[pose + 3] * a + w[pose + 4] * b + w[pose + 5] * c + w[pose + 10]
         z = w[pose + 6] * a + w[pose + 7] * b + w[pose + 8] * c + w[pose + 11]
-        s = radial(w, x * x + y * y, z)[0]
-        u, v = s * x - w[e], s * y - w[e + 1]
-        total += w[j] * u * u + 2.0 * w[j + 1] * u * v + w[j + 2] * v * v
-        o += 3
-        e += 2
-        j += step
-    return total if total < math.inf else math.inf
+        s = radial_of_four(w, x * x + y * y, z)[0]
+        seen_x, seen_y = _seen(w, first, n)
+        u, v = s * x - seen_x, s * y - seen_y
+        p00, p01, p11 = _weights(w, first, n)
+        cost += p00 * u * u + 2.0 * p01 * u * v + p11 * v * v
+    whole = total(cost)
+    return whole if whole < math.inf else math.inf
 
 
 @compiled(NUMBER, W, WHOLE, WHOLE, NUMBER, WHOLE, WHOLE)
@@ -46,23 +78,22 @@ def derivatives(w, n, pose, second, g, H):
     r3, r4, r5 = w[pose + 3], w[pose + 4], w[pose + 5]
     r6, r7, r8 = w[pose + 6], w[pose + 7], w[pose + 8]
     t0, t1, t2 = w[pose + 9], w[pose + 10], w[pose + 11]
-    o, e, j = POINTS, POINTS + SEEN * n, POINTS + INFO * n
-    step, total = int(w[INFO_STEP]), 0.0
-    g0 = g1 = g2 = g3 = g4 = g5 = 0.0
-    h00 = h01 = h02 = h11 = h12 = h22 = 0.0
-    h03 = h04 = h05 = h13 = h14 = h15 = h23 = h24 = h25 = 0.0
-    h33 = h34 = h35 = h44 = h45 = h55 = 0.0
-    for _ in range(n):
-        o0, o1, o2 = w[o], w[o + 1], w[o + 2]
+    cost = g0 = g1 = g2 = g3 = g4 = g5 = four(0.0, 0.0, 0.0, 0.0)
+    h00 = h01 = h02 = h11 = h12 = h22 = cost
+    h03 = h04 = h05 = h13 = h14 = h15 = h23 = h24 = h25 = cost
+    h33 = h34 = h35 = h44 = h45 = h55 = cost
+    for first in range(0, n, 4):
+        o0, o1, o2 = _points(w, first, n)
         a0 = r0 * o0 + r1 * o1 + r2 * o2
         a1 = r3 * o0 + r4 * o1 + r5 * o2
         a2 = r6 * o0 + r7 * o1 + r8 * o2
         x, y, z = a0 + t0, a1 + t1, a2 + t2
-        s, s_q, s_z, s_qq, s_qz, s_zz = radial(w, x * x + y * y, z)
-        u, v = s * x - w[e], s * y - w[e + 1]
-        p00, p01, p11 = w[j], w[j + 1], w[j + 2]
+        s, s_q, s_z, s_qq, s_qz, s_zz = radial_of_four(w, x * x + y * y, z)
+        seen_x, seen_y = _seen(w, first, n)
+        u, v = s * x - seen_x, s * y - seen_y
+        p00, p01, p11 = _weights(w, first, n)
         e0, e1 = p00 * u + p01 * v, p01 * u + p11 * v
-        total += u * e0 + v * e1
+        cost += u * e0 + v * e1
         ux, uy, uz = s + 2.0 * x * x * s_q, 2.0 * x * y * s_q, x * s_z
         vy, vz = s + 2.0 * y * y * s_q, y * s_z
         f0, f1, f2 = ux * e0 + uy * e1, uy * e0 + vy * e1, uz * e0 + vz * e1
@@ -110,16 +141,14 @@ def derivatives(w, n, pose, second, g, H):
         h11 += a2 * k10 - a0 * k12 - b0 - b2
         h12 += a0 * k11 - a1 * k10 + 0.5 * (a1 * f2 + a2 * f1)
         h22 += a0 * k21 - a1 * k20 - b0 - b1
-        o += 3
-        e += 2
-        j += step
-    w[g], w[g + 1], w[g + 2] = g0, g1, g2
-    w[g + 3], w[g + 4], w[g + 5] = g3, g4, g5
-    w[H], w[H + 1], w[H + 2] = h00, h01, h02
-    w[H + 3], w[H + 4], w[H + 5] = h03, h04, h05
-    w[H + 7], w[H + 8], w[H + 9] = h11, h12, h13
-    w[H + 10], w[H + 11], w[H + 14] = h14, h15, h22
-    w[H + 15], w[H + 16], w[H + 17] = h23, h24, h25
-    w[H + 21], w[H + 22], w[H + 23] = h33, h34, h35
-    w[H + 28], w[H + 29], w[H + 35] = h44, h45, h55
-    return total if total < math.inf else math.inf
+    w[g], w[g + 1], w[g + 2] = total(g0), total(g1), total(g2)
+    w[g + 3], w[g + 4], w[g + 5] = total(g3), total(g4), total(g5)
+    w[H], w[H + 1], w[H + 2] = total(h00), total(h01), total(h02)
+    w[H + 3], w[H + 4], w[H + 5] = total(h03), total(h04), total(h05)
+    w[H + 7], w[H + 8], w[H + 9] = total(h11), total(h12), total(h13)
+    w[H + 10], w[H + 11], w[H + 14] = total(h14), total(h15), total(h22)
+    w[H + 15], w[H + 16], w[H + 17] = total(h23), total(h24), total(h25)
+    w[H + 21], w[H + 22], w[H + 23] = total(h33), total(h34), total(h35)
+    w[H + 28], w[H + 29], w[H + 35] = total(h44), total(h45), total(h55)
+    whole = total(cost)
+    return whole if whole < math.inf else math.inf

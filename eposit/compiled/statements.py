@@ -36,7 +36,7 @@ class Body(Expressions):
     def visit_AugAssign(self, node: ast.AugAssign) -> None:
         """A target changed by an operation."""
         if isinstance(node.target, ast.Subscript):
-            place = self.place(node.target)
+            place = self.place(node.target, self.value(node.target.value))
             before = self.assigned("double", f"load double, ptr {place}")
             after = self.operation(node.op, before, self.value(node.value), node)
             self.line(f"store double {after.text}, ptr {place}")
@@ -55,7 +55,7 @@ class Body(Expressions):
             self.refuse(target, "is one target for several values")
         elif isinstance(target, ast.Subscript):
             number = self.as_kind(values, "double", target)
-            self.line(f"store double {number}, ptr {self.place(target)}")
+            self.line(f"store double {number}, ptr {self.place(target, self.value(target.value))}")
         elif isinstance(target, ast.Name):
             self._store(target.id, values, target)
         else:

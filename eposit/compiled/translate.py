@@ -4,7 +4,9 @@ A function has whole numbers (64 bits), numbers (double precision), truth values
 keep the type of their first value, and a whole number becomes a number where one is wanted, never the reverse. There
 are assignments, also of several values, `if`, `while`, `for ... in range(...)`, `break`, `continue`, `return`;
 arithmetic, comparisons, `and`, `or`, `not`, `a if b else c`, one index in brackets; `abs`, `min` and `max` of two,
-`int`, functions of `math`, and other kernels. Anything else is refused. A division by zero gives infinity or NaN, as in
+`int`, functions of `math`, and other kernels. `four` puts four numbers side by side, and what is done with them is done
+in each of these lanes; a comparison of such decides in `a if b else c` for each lane on its own, and a kernel of single
+numbers is called once for each lane. Anything else is refused. A division by zero gives infinity or NaN, as in
 NumPy; a quotient or remainder of whole numbers is right where neither is negative.
 
 Sums and products stay in the order in which they are written: results do not depend on what LLVM could rearrange.
@@ -16,14 +18,15 @@ import ast
 from functools import cache
 from pathlib import Path
 
-from eposit.compiled.expressions import FUNCTIONS, llvm_type
-from eposit.compiled.kernel import NOTHING, Kernel
+from eposit.compiled.expressions import FUNCTIONS, FUNCTIONS_OF_FOUR, llvm_type
+from eposit.compiled.kernel import NOTHING, NUMBERS, Kernel
 from eposit.compiled.statements import Body
 
 
 def module_text(kernel: Kernel) -> str:
     """A kernel and all that it calls; the kernel alone can be called from outside."""
     lines = [f"declare double @{name}({', '.join(['double'] * count)})" for name, count in FUNCTIONS.values()]
+    lines += [f"declare {NUMBERS} @{name}({NUMBERS})" for name in FUNCTIONS_OF_FOUR.values()]
     done: set[str] = set()
     wanted = [kernel]
     while wanted:
