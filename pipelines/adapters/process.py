@@ -1,4 +1,4 @@
-"""A user's function in a process of its own: exit, hang, fork, crash or print there is a status of one image."""
+"""A user's function in a process of its own: exit, hang, fork, crash, print or greed is a status of one image."""
 
 from __future__ import annotations
 
@@ -12,12 +12,10 @@ from typing import Any
 
 from datasets.errors import UserError
 from eposit import Status
+from pipelines.adapters.limits import Limits, lift_memory_limit, limit_memory
 from pipelines.adapters.results import PoseResult
 from pipelines.adapters.user import attempt, check_call, load_function
 from pipelines.children import Child, start
-
-LIMIT_S, MOST_LIMIT_S = 300.0, 86_400.0  # for one image: what is taken without `--timeout`, and its largest value
-
 
 START_S = 120.0  # for starting the process and importing the function, at least: a crowded machine takes its time
 
@@ -35,9 +33,9 @@ class Form:
 class FunctionProcess:
     """Calls a function for one image after the other. A process that ended, or took too long, is replaced."""
 
-    def __init__(self, name: str, form: Form, limit_s: float) -> None:
+    def __init__(self, name: str, form: Form, limits: Limits) -> None:
         self._child: Child | None = None
-        self._name, self._form, self._limit_s = name, form, limit_s
+        self._name, self._form, self._limits = name, form, limits
         self.takes_keyword: bool = self._started()
 
     def call(self, tell: Callable[[str], None], *arguments: Any, **keywords: Any) -> PoseResult:
@@ -48,7 +46,7 @@ class FunctionProcess:
         """
         if self._child is None:
             self._started()
-        answer = self._answer(self._limit_s, (arguments, keywords))
+        answer = self._answer(self._limits.seconds, (arguments, keywords))
         if isinstance(answer, str):
             tell(answer)
             return PoseResult(Status.SOLVER_ERROR)
@@ -72,14 +70,14 @@ class FunctionProcess:
         Raises:
             UserError: it cannot be imported or called, or importing it ends the process or takes too long.
         """
-        self._child = start(_serve, self._name, self._form)
-        answer = self._answer(max(START_S, self._limit_s))
+        self._child = start(_serve, self._name, self._form, self._limits)
+        answer = self._answer(max(START_S, self._limits.seconds))
         if isinstance(answer, str):
             raise UserError(f"{self._form.option} {self._name}: importing it failed: it {answer}; mend it")
         return answer
 
     def _answer(self, limit_s: float, question: Any = None) -> Any:
-        """What the process sends, after it was sent a question; a text of what became of it if it sends nothing.
+        """What the process sends, after it was sent a question; a text of why it could not, and of what became of it.
 
         Raises:
             UserError: the process sent one.
@@ -96,6 +94,8 @@ class FunctionProcess:
                 answer = child.pipe.recv()
                 if isinstance(answer, UserError):
                     raise answer
+                if isinstance(answer, str):
+                    self.end()  # with what it holds
                 return answer
         except (EOFError, OSError):
             pass
@@ -105,15 +105,15 @@ class FunctionProcess:
 
 
 @functools.lru_cache(maxsize=1)
-def function_process(name: str, form: Form, limit_s: float = LIMIT_S) -> FunctionProcess:
+def function_process(name: str, form: Form, limits: Limits) -> FunctionProcess:
     """A process that calls package.module:function; the one of the last call if it is for the same.
 
-    limit_s: for each image. `end_function_process` ends it, and so does the end of this process.
+    `end_function_process` ends it, and so does the end of this process.
 
     Raises:
         UserError: the function cannot be imported or called.
     """
-    return FunctionProcess(name, form, limit_s)
+    return FunctionProcess(name, form, limits)
 
 
 def end_function_process() -> None:
@@ -121,23 +121,17 @@ def end_function_process() -> None:
     function_process.cache_clear()
 
 
-def check_limit(limit_s: float) -> None:
-    """Refuse a time limit that is not usable.
-
-    Raises:
-        UserError: not above 0, or more than a day.
-    """
-    if not 0.0 < limit_s <= MOST_LIMIT_S:
-        raise UserError(f"--timeout {limit_s:g}: give seconds above 0 and at most {MOST_LIMIT_S:g}, as 60")
-
-
-def _serve(pipe: Connection, name: str, form: Form) -> None:
+def _serve(pipe: Connection, name: str, form: Form, limits: Limits) -> None:
     """Call the function for what comes through the pipe; what it prints goes to stderr.
 
     A function may break what this needs, as the pipe's descriptor or an import: the process then ends with a line.
     """
     try:
+        limit_memory(limits)
         _answer_calls(pipe, name, form)
+    except (MemoryError, OutOfMemoryError):
+        lift_memory_limit()
+        pipe.send(f"ran out of memory, of which --memory-mb allows {limits.memory_mb} MB")
     except Exception as error:
         sys.exit(f"{form.option} {name} broke its own process ({type(error).__name__}: {error})")
 
@@ -166,6 +160,10 @@ def _answer_calls(pipe: Connection, name: str, form: Form) -> None:
         return
 
 
+class OutOfMemoryError(BaseException):
+    """What a user's function raised for lack of memory; no Exception, so that it ends the process with all it holds."""
+
+
 class RaisedToEndError(Exception):
     """What a user's function raised to end its process, as KeyboardInterrupt; the message is its name and text."""
 
@@ -174,10 +172,13 @@ def _tamed(function: Callable[..., Any], *arguments: Any, **keywords: Any) -> An
     """What a function gives; what it raises to end its process is a failure of one image as any other.
 
     Raises:
-        Exception: what the function raised.
+        OutOfMemoryError: it raised a MemoryError.
+        Exception: what it raised.
     """
     try:
         return function(*arguments, **keywords)
+    except MemoryError:
+        raise OutOfMemoryError from None
     except (Exception, SystemExit):
         raise
     except BaseException as error:

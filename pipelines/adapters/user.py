@@ -50,6 +50,8 @@ def load_function(name: str, option: str) -> Callable[..., Any]:
         sys.path.append(here)  # behind a frozen copy of the function, if the path begins with one
     try:
         found_there: Any = importlib.import_module(module_name)
+    except MemoryError:
+        raise
     except (Exception, SystemExit) as error:
         raise UserError(
             f"{option} {name}: importing {module_name} failed with {_line(error)}; mend it, or run from its folder"

@@ -146,6 +146,9 @@ Overwrite = Annotated[
 Timeout = Annotated[
     float, typer.Option(metavar="SECONDS", help="Time that a function of yours may take for one image.")
 ]
+MemoryMb = Annotated[
+    int, typer.Option(metavar="MB", help="Memory that the process of a function of yours may take; on Linux.")
+]
 PointsName = Annotated[str, typer.Option("--points", help="detected, truth or truth+noise.")]
 CameraName = Annotated[str, typer.Option("--camera", help="Camera that is assumed: exact, nominal or paper.")]
 Use = Annotated[str, typer.Option("--use", help="Object points: four or all.")]

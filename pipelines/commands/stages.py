@@ -32,6 +32,7 @@ def run(
     solver: o.MoreSolvers = None,
     estimator: o.MoreEstimators = None,
     timeout: o.Timeout = 300.0,
+    memory_mb: o.MemoryMb = 1500,
     detect_seconds: o.DetectSeconds = 2.0,
     workers: o.Workers = 1,
     engine: o.EngineName = "local",
@@ -47,12 +48,12 @@ def run(
     from pipelines.stages.kernels import compiled_ahead
     from pipelines.stages.settings import System, run_settings, settings_of
 
-    execution = _execution(engine, workers, ray_address, shard, quiet, timeout, detect_seconds)
+    execution = _execution(engine, workers, ray_address, shard, quiet, (timeout, memory_mb), detect_seconds)
     more, systems = settings_of(solver or []), estimator or []
     for name in solver or []:
-        solver_of(name, limit_s=timeout)  # what cannot be called is told before anything is rendered
+        solver_of(name, limits=execution.limits)  # what cannot be called is told before anything is rendered
     for name in systems:
-        estimator_of(name, timeout)
+        estimator_of(name, execution.limits)
     kept, loaded = kept_by(no_masters, pack_masters), load(recipe, regime)
     tell_cost(loaded[0], out, execution, Start(workers, ALL_STAGES, kept, ignore_disk))
     with begin(loaded, out, reuse, execution, kept) as dataset:
@@ -147,6 +148,7 @@ def estimate(
     detector: o.DetectorName = "edge-fit",
     overwrite: o.Overwrite = False,
     timeout: o.Timeout = 300.0,
+    memory_mb: o.MemoryMb = 1500,
     workers: o.Workers = 1,
     engine: o.EngineName = "local",
     ray_address: o.RayAddress = None,
@@ -158,7 +160,7 @@ def estimate(
     from pipelines.stages.settings import Setting, System
 
     setting = Setting("best" if solver is None else solver, points, camera, use, noise_px, draws, detector)
-    execution = _execution(engine, workers, ray_address, shard, quiet, timeout)
+    execution = _execution(engine, workers, ray_address, shard, quiet, (timeout, memory_mb))
     if estimator is None:
         with writing(folder, shared=not execution.part.is_whole) as dataset:
             stages.run_estimate(dataset, [setting], execution, overwrite=overwrite)
@@ -266,23 +268,23 @@ def _execution(
     ray_address: str | None,
     shard: str | None,
     quiet: bool,
-    limit_s: float = 300.0,
+    limits: tuple[float, int] = (300.0, 1500),
     detect_seconds: float = 2.0,
 ) -> Execution:
-    """What the options about where and how much mean.
+    """What the options about where and how much mean. limits: seconds and MB of a user's function.
 
     Raises:
-        UserError: a part, an engine or a time limit that is not usable.
+        UserError: a part, an engine or a limit that is not usable.
     """
-    from pipelines.adapters.process import check_limit
+    from pipelines.adapters.limits import Limits
     from pipelines.stages.missing import Execution
     from pipelines.stages.settings import check_detect_seconds
 
-    check_limit(limit_s)
+    given = Limits(*limits)
     check_detect_seconds(detect_seconds)
     part = part_of(shard)
     place = engine_of(engine, workers, ray_address)
-    return Execution(place, Console(quiet=quiet), part, limit_s=limit_s, detect_seconds=detect_seconds, goes_on=True)
+    return Execution(place, Console(quiet=quiet), part, limits=given, detect_seconds=detect_seconds, goes_on=True)
 
 
 def _report(dataset: Dataset) -> None:

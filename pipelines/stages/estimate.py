@@ -18,7 +18,8 @@ from datasets.schema import FRAMES
 from datasets.store.dataset import Dataset
 from eposit import Solution, Status
 from eposit.arrays import Array, Mask
-from pipelines.adapters.process import LIMIT_S, Form, function_process
+from pipelines.adapters.limits import DEFAULT, Limits
+from pipelines.adapters.process import Form, function_process
 from pipelines.adapters.registry import find_solver, takes_theta_centre
 from pipelines.adapters.results import PoseResult, Solver, gather
 from pipelines.adapters.user import SIGMA, SOLVER_FORM, as_solver, is_given
@@ -34,13 +35,13 @@ def is_done(dataset: Dataset, index: int, setting: Setting) -> bool:
     return dataset.is_done(path_of_shard(dataset, index, setting.name))
 
 
-def run_shard(dataset: Dataset, index: int, setting: Setting, limit_s: float = LIMIT_S) -> str | None:
+def run_shard(dataset: Dataset, index: int, setting: Setting, limits: Limits = DEFAULT) -> str | None:
     """Make one shard of `estimates`; what a user's function first failed with, if it did.
 
-    limit_s: that such a function, which runs in a process of its own, may take for one image.
+    limits: of such a function, which runs in a process of its own.
     """
     notes: list[str] = []
-    solver = solver_of(setting.solver, notes.append, limit_s)
+    solver = solver_of(setting.solver, notes.append, limits)
     count = shard_count(dataset.recipe)
     columns = [name for name in FRAMES.names if name != "image"]
     frames = dataset.read_shard(dataset.shard_path("frames", index, count), columns).to_pylist()
@@ -60,7 +61,7 @@ def run_shard(dataset: Dataset, index: int, setting: Setting, limit_s: float = L
     return notes[0] if notes else None
 
 
-def solver_of(name: str, tell: Callable[[str], None] = lambda _: None, limit_s: float = LIMIT_S) -> Solver:
+def solver_of(name: str, tell: Callable[[str], None] = lambda _: None, limits: Limits = DEFAULT) -> Solver:
     """The solver of a name; a user's function in a process of its own.
 
     tell: called with one line for every image on which a user's function failed.
@@ -70,7 +71,7 @@ def solver_of(name: str, tell: Callable[[str], None] = lambda _: None, limit_s: 
     """
     if not is_given(name):
         return find_solver(name)
-    process = function_process(name, Form("--solver", SOLVER_FORM, 3, SIGMA), limit_s)
+    process = function_process(name, Form("--solver", SOLVER_FORM, 3, SIGMA), limits)
     return as_solver(functools.partial(process.call, tell), process.takes_keyword)
 
 

@@ -18,7 +18,8 @@ from datasets.rows import decode_image, estimate_rows
 from datasets.schema import FRAMES
 from datasets.store.dataset import Dataset
 from eposit import Camera
-from pipelines.adapters.process import LIMIT_S, Form, function_process
+from pipelines.adapters.limits import DEFAULT, Limits
+from pipelines.adapters.process import Form, function_process
 from pipelines.adapters.results import PoseResult, stack
 from pipelines.adapters.user import attempt, check_call, load_function
 from pipelines.stages.estimate import path_of_shard
@@ -54,14 +55,14 @@ def run_shard(
     advance: Callable[[], None] = lambda: None,
     *,
     system: System,
-    limit_s: float = LIMIT_S,
+    limits: Limits = DEFAULT,
 ) -> str | None:
     """Make one shard of `estimates` from the same shard of `frames`; what the function first failed with, if it did.
 
-    The function is called once for each image, (h, w) grey values. advance: called after each frame. limit_s: that a
-    user's function, which runs in a process of its own, may take for one image.
+    The function is called once for each image, (h, w) grey values. advance: called after each frame. limits: of a
+    user's function, which runs in a process of its own.
     """
-    answer = estimator_of(system.name, limit_s)
+    answer = estimator_of(system.name, limits)
     target = dataset.recipe.target
     path = dataset.shard_path("frames", index, shard_count(dataset.recipe))
     answers: list[PoseResult] = []
@@ -77,7 +78,7 @@ def run_shard(
     return notes[0] if notes else None
 
 
-def estimator_of(name: str, limit_s: float = LIMIT_S) -> Callable[..., PoseResult]:
+def estimator_of(name: str, limits: Limits = DEFAULT) -> Callable[..., PoseResult]:
     """What answers for one image, called with where to tell of a failure, image, camera and target.
 
     Raises:
@@ -86,7 +87,7 @@ def estimator_of(name: str, limit_s: float = LIMIT_S) -> Callable[..., PoseResul
     if name in OWN_SYSTEMS:
         function = find_estimator(name)
         return lambda tell, *given: attempt(functools.partial(function, *given), f"--estimator {name}", tell)
-    return function_process(name, Form("--estimator", ESTIMATOR_FORM, 3), limit_s).call
+    return function_process(name, Form("--estimator", ESTIMATOR_FORM, 3), limits).call
 
 
 def system_rows(frame_ids: Sequence[int], system: System, answers: Sequence[PoseResult]) -> pa.Table:

@@ -17,7 +17,7 @@ from datasets.plan import frame_ids_of_shard
 from datasets.store.atomic import write_text
 from datasets.store.dataset import Dataset
 from datasets.store.quarantine import FAILED, QUARANTINE
-from pipelines.adapters.process import LIMIT_S
+from pipelines.adapters.limits import DEFAULT, Limits
 from pipelines.detection.time_limit import DETECT_SECONDS
 from pipelines.engines.engine import Engine, Failure
 from pipelines.stages.part import WHOLE, Part
@@ -58,7 +58,7 @@ class Execution:
     console: Console
     part: Part = WHOLE
     lists: bool = True  # whether each stage writes the manifest at its end
-    limit_s: float = LIMIT_S  # for a user's function and one image
+    limits: Limits = DEFAULT  # of a user's function
     detect_seconds: float = DETECT_SECONDS  # of processor time, for the detection of one picture
     goes_on: bool = False  # whether a shard that fails twice is left out, and noted, instead of ending all
     failures: list[ShardFailure] = field(default_factory=list)  # of the shards that could not be made

@@ -78,10 +78,10 @@ def run_estimate(
         stage = Stage(
             f"estimate {setting.name}",
             functools.partial(estimate.is_done, setting=setting),
-            functools.partial(estimate.run_shard, setting=setting, limit_s=execution.limit_s),
+            functools.partial(estimate.run_shard, setting=setting, limits=execution.limits),
             hint=MAKE_AGAIN,
         )
-        check = functools.partial(estimate.solver_of, setting.solver, limit_s=execution.limit_s)
+        check = functools.partial(estimate.solver_of, setting.solver, limits=execution.limits)
         _run_answers(stage, dataset, setting.name, execution, check if overwrite else None)
 
 
@@ -90,11 +90,11 @@ def run_system(dataset: Dataset, system: System, execution: Execution, *, overwr
     stage = Stage(
         f"estimate {system.shard_name}",
         functools.partial(systems.is_done, system=system),
-        functools.partial(systems.run_shard, system=system, limit_s=execution.limit_s),
+        functools.partial(systems.run_shard, system=system, limits=execution.limits),
         by_frame=True,
         hint=MAKE_AGAIN,
     )
-    check = functools.partial(systems.estimator_of, system.name, execution.limit_s)
+    check = functools.partial(systems.estimator_of, system.name, execution.limits)
     _run_answers(stage, dataset, system.shard_name, execution, check if overwrite else None)
 
 

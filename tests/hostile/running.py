@@ -67,7 +67,7 @@ def run_case(kind: ModuleType, seed: str, source: Path, text: str, folder: Path)
     status, usage, late = _wait(pid, begin + LIMIT_S * getattr(kind, "PATIENCE", 1))
     rss = usage.ru_maxrss * 1024
     outcome = _outcome(folder, time.monotonic() - begin, rss)
-    if rss > getattr(kind, "MOST_RSS", MOST_RSS):
+    if rss > MOST_RSS:
         outcome.faults.append(f"took {rss / 2**20:.0f} MB")
     outcome.faults += [f"no end within {outcome.seconds:.0f} s"] if late else _ending(status)
     left = orphans()

@@ -40,6 +40,9 @@ BODIES = (
     "import os; os.chdir('/'); open('/proc/self/x', 'w')",
     "import sys; sys.setrecursionlimit(10**9)\n    def f(): f()\n    f()",
     "x = bytearray(10**10)",
+    "x = np.ones(10**10, np.uint8)",
+    "x = []\n    while True: x.append(bytearray(10**6))",
+    "global kept; kept = []\n    while True: kept.append(bytearray(10**5))",
     "return [0] * 10**7",
     "import gc; gc.disable(); import builtins; builtins.len = None",
     "import numpy; numpy.array = None",
@@ -128,7 +131,6 @@ IMPORTS = (
     "def solve(a, b, c, d, e): pass",
     "import sys; sys.modules['numpy'] = None\ndef solve(a, b, c): return None",
 )
-MOST_RSS = 2**40  # bytes: what a user's function takes is its own affair, and these ask for all that there is
 PATIENCE = 3  # an import may take two minutes
 
 

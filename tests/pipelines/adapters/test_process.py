@@ -5,12 +5,14 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import sys
 
 import pytest
 
 from datasets.errors import UserError
 from pipelines.adapters import process
-from pipelines.adapters.process import Form, check_limit, end_function_process, function_process
+from pipelines.adapters.limits import DEFAULT, Limits
+from pipelines.adapters.process import Form, end_function_process, function_process
 from tests.own import own_module
 from tests.wrong_input import assert_one_sentence
 
@@ -45,6 +47,14 @@ MISCHIEF = """
             print("so many words")
         if image == "recurse":
             return act(image, camera, target)
+        if image == "take 10 GB":
+            return bytearray(10**10)
+        if image == "recurse on":
+            sys.setrecursionlimit(10**9)
+            return act(image, camera, target)
+        if image == "keep":
+            act.kept = np.ones(5 * 10**6)
+            return bytearray(10**8)
         if image == "close":
             for number in range(3, 50):
                 try:
@@ -67,8 +77,8 @@ HARMLESS = ("fork", "fork and stay", "print", "")
 
 
 @contextlib.contextmanager
-def closing_process(name, limit_s=2.0):
-    yield function_process(name, FORM, limit_s)
+def closing_process(name, limits=DEFAULT):
+    yield function_process(name, FORM, limits)
     end_function_process()
 
 
@@ -78,7 +88,7 @@ def name(tmp_path, monkeypatch):
 
 
 def test_whatever_a_function_does_is_a_status(name, capfd):
-    with closing_process(name) as called:
+    with closing_process(name, Limits(2.0)) as called:
         for image in (*ENDS, *HARMLESS):
             notes = []
             answer = called.call(notes.append, image, None, None)
@@ -102,6 +112,10 @@ def test_a_process_that_loses_its_pipe_is_a_status(name, capfd):
     [
         ("import os; os._exit(0)", "importing it failed: it ended its process, which ended with exit code 0"),
         ("import time; time.sleep(600)", "importing it failed: it took longer than 1 s"),
+        (
+            "bytearray(10**10)",
+            "importing it failed: it ran out of memory, of which --memory-mb allows 1500 MB; mend it",
+        ),
         ("raise KeyboardInterrupt", "importing it failed with KeyboardInterrupt; mend it"),
         ("1 / 0", "failed with ZeroDivisionError: division by zero"),
     ],
@@ -111,13 +125,35 @@ def test_a_module_that_does_harm_when_imported_is_a_sentence(text, words, tmp_pa
     # Enough to start and import on a busy machine, but for the one that never ends.
     monkeypatch.setattr(process, "START_S", 1.0 if "sleep" in text else 10.0)
     with pytest.raises(UserError, match=words):
-        function_process(f"{module}:act", FORM, 1.0)
+        function_process(f"{module}:act", FORM, Limits(1.0))
 
 
 @pytest.mark.parametrize("limit", [0.0, -1.0, float("nan"), float("inf"), 1e9])
 def test_a_time_limit_that_is_none(limit):
     with pytest.raises(UserError, match="give seconds above 0"):
-        check_limit(limit)
+        Limits(limit)
+
+
+@pytest.mark.parametrize("limit", [-1, 0, 99, 10**9])
+def test_a_limit_of_memory_that_is_none(limit):
+    with pytest.raises(UserError, match=f"--memory-mb {limit}: give MB from 100 to 10000000, as 1500"):
+        Limits(memory_mb=limit)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the limit is Linux's")
+def test_a_function_that_takes_too_much_memory_is_a_status(name):
+    """Its process is another one afterwards, without what the function has kept. The limit is small to be met soon.
+
+    Where an interpreter runs out of memory in a call of Python's, it may raise a SystemError instead.
+    """
+    with closing_process(name, Limits(60.0, memory_mb=100)) as called:
+        for image in ("take 10 GB", "keep", "recurse on"):
+            notes = []
+            assert called.call(notes.append, image, None, None).status == "solver_error"
+            assert notes == ["ran out of memory, of which --memory-mb allows 100 MB"] or (
+                image == "recurse on" and notes[0].startswith("SystemError")
+            )
+            assert called.call(notes.append, "", None, None).status == "ok"
 
 
 @pytest.mark.full

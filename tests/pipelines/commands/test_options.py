@@ -2,6 +2,7 @@
 
 import inspect
 
+from pipelines.adapters.limits import Limits
 from pipelines.commands import options, stages
 from pipelines.detection import Detector
 from pipelines.stages.settings import CAMERAS, POINTS, USES, Setting
@@ -20,6 +21,9 @@ def test_defaults_are_those_of_a_setting():
     assert own.items() <= defaults(stages.estimate).items()
     assert defaults(stages.score)["camera"] == own["camera"]
     assert defaults(stages.detect)["detector"] == own["detector"]
+    for command in (stages.run, stages.estimate):
+        assert defaults(command)["timeout"] == Limits().seconds
+        assert defaults(command)["memory_mb"] == Limits().memory_mb
     assert f"[default: {Setting().solver}]" in help_of(options.SolverName)
 
 
