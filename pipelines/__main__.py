@@ -1,8 +1,13 @@
 """`python -m pipelines`."""
 
+import os
 import sys
 
 from pipelines.endings import Stopped, listen, listen_no_more, say_stopped
+
+# NumPy's linear algebra reads it when it is loaded, in workers, too. These matrices are small: a second thread waits
+# for them busily and takes as much processor time again, which other workers could use.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 def main() -> int:

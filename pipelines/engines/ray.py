@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from threadpoolctl import threadpool_limits
+
 from datasets.errors import UserError
 from pipelines.engines.engine import FATAL, Failure, Result, Task, check_workers
 
@@ -102,7 +104,8 @@ def check_address(address: str) -> None:
 
 def _run_in(folder: str, run_one: Callable[[Task], Result], task: Task) -> Result:
     os.chdir(folder)
-    return run_one(task)
+    with threadpool_limits(1, "blas"):  # as `pipelines.__main__` has it
+        return run_one(task)
 
 
 def _connected(engine: RayEngine) -> Any:

@@ -53,7 +53,7 @@ def test_points_are_where_the_target_says_and_under_their_own_number(target):
     # 8 bits without noise: a corner of squares of 35 px is good to 0.004 px, one of a tag's to 0.008.
     assert np.sqrt(np.mean(error**2)) < 0.009
     assert np.all(np.abs(error.mean(axis=0)) < 0.002 + 3.0 * error.std(axis=0) / np.sqrt(len(error)))
-    # Nine corners alone scatter by a third, and no noise is drawn. Measured 0.19 to 2.05, the largest on a bent board of
+    # Nine corners scatter by a third, and no noise is drawn. Measured 0.19 to 2.05, the largest on a bent board of
     # 28 corners, of which one at the border, 0.01 px off, is 22 alone.
     assert 0.15 < normalised.mean() < 2.3
 
