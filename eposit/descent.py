@@ -19,15 +19,12 @@ def to_minimum(problem: Problem, start: Pose) -> Solution:
 
     n, w = len(problem.points_in_obj), workspace(problem.camera, len(problem.points_in_obj))
     obj, weights = np.ascontiguousarray(problem.points_in_obj), inverse_covariances(problem.weights)
-    starts, done = np.hstack((start.R.reshape(-1, 9), start.t)), 0
+    pixels, starts = np.ascontiguousarray(problem.points_px), np.hstack((start.R.reshape(-1, 9), start.t))
 
-    def run(pixels: Array, out: Array) -> None:
-        nonlocal done
-        part = np.ascontiguousarray(starts[done : done + len(pixels)])
-        done += len(pixels)
+    def run(out: Array, first: int, stop: int) -> None:
         native(refine_poses)(
-            w.ctypes.data, n, obj.ctypes.data, pixels.ctypes.data, weights.ctypes.data, n, len(pixels),
-            part.ctypes.data, out.ctypes.data,
+            w.ctypes.data, n, obj.ctypes.data, pixels.ctypes.data, weights.ctypes.data, n, len(pixels), first, stop,
+            starts.ctypes.data, out.ctypes.data,
         )  # fmt: skip
 
-    return solve_batch(run, np.ascontiguousarray(problem.points_px), LINEAR_RESULT, 1.0)
+    return solve_batch(run, (len(pixels), n), LINEAR_RESULT, 1.0)

@@ -1,4 +1,4 @@
-"""Rows of numbers that the compiled solvers write, as solutions."""
+"""Numbers that the compiled solvers write, as solutions."""
 
 from __future__ import annotations
 
@@ -25,20 +25,19 @@ from eposit.compiled.layout import (
 from eposit.pose import Pose
 from eposit.solution import Alternatives, Solution, Status, status_names
 
-CHUNK = 512  # images whose rows stay in the processor's cache
+CHUNK = 4096  # images after which a batch can be interrupted
 BLOCKS = ((0, POSE), (POSE, POSE + 9), (POSE + 9, COVARIANCE), (COVARIANCE, OTHERS), (OTHERS, RESULT))
 NO_COVARIANCE = np.broadcast_to(np.nan, (6, 6))
 NO_ALTERNATIVES = Alternatives.none()
 STATUS_OF = tuple(Status)
 
-Run = Callable[[Array, Array], None]  # (b, n, 2) image points, (b, width) results to be written
+Run = Callable[[Array, int, int], None]  # writes results of the images from the first to the second number
 
 
-def solve_one(run: Run, pixels: Array, width: int, variance: float) -> Solution:
-    """The solution of a single image, (1, n, 2). variance: what its costs are to be divided by."""
-    out = np.empty((1, width))
-    run(pixels, out)
-    row, inliers = out[0], np.ones(pixels.shape[1], np.bool_)
+def solve_one(run: Run, shape: tuple[int, int], width: int, variance: float) -> Solution:
+    """The solution of a single image. shape: (1, n). variance: what its costs are to be divided by."""
+    row, inliers = np.empty(width), np.ones(shape[1], np.bool_)
+    run(row, 0, 1)
     code, steps, rmse, cost, ambiguous, unreliable = row[:POSE].tolist()
     pose = Pose(row[POSE : POSE + 9].reshape(3, 3), row[POSE + 9 : COVARIANCE])
     status, iterations = STATUS_OF[int(code)], int(steps)
@@ -53,16 +52,13 @@ def solve_one(run: Run, pixels: Array, width: int, variance: float) -> Solution:
     )  # fmt: skip
 
 
-def solve_batch(run: Run, pixels: Array, width: int, variance: float) -> Solution:
-    """The solutions of (b, n, 2) image points. variance: what their costs are to be divided by."""
-    b, n = pixels.shape[:2]
-    blocks = [np.empty((b, stop - start)) for start, stop in BLOCKS if stop <= width]
-    out = np.empty((min(b, CHUNK), width))
-    for start in range(0, b, CHUNK):
-        part = pixels[start : start + CHUNK]
-        run(part, out)
-        for block, (first, stop) in zip(blocks, BLOCKS, strict=False):
-            block[start : start + CHUNK] = out[: len(part), first:stop]
+def solve_batch(run: Run, shape: tuple[int, int], width: int, variance: float) -> Solution:
+    """The solutions of b images of n points. shape: (b, n). variance: what their costs are to be divided by."""
+    b, n = shape
+    out = np.empty(b * width)  # one array: a large one is given large pages of memory, several times faster
+    for first in range(0, b, CHUNK):
+        run(out, first, min(first + CHUNK, b))
+    blocks = [out[b * start : b * stop].reshape(b, stop - start) for start, stop in BLOCKS if stop <= width]
     numbers, R, t, *rest = blocks
     status, pose = status_names(numbers[:, STATUS].astype(np.int8)), Pose(R.reshape(b, 3, 3), t)
     iterations, rmse, cost = numbers[:, ITERATIONS].astype(np.int64), numbers[:, RMSE].copy(), numbers[:, PRICE].copy()

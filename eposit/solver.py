@@ -133,13 +133,13 @@ def _best(
     n, w = len(obj), workspace(camera, len(obj))
     most = variance * chi_square_limit(2.0 * n - 6.0) if variance > 0.0 and n > 3 else np.inf
 
-    def run(pixels: Array, out: Array) -> None:
+    def run(out: Array, first: int, stop: int) -> None:
         native(solve_best)(
             w.ctypes.data, n, obj.ctypes.data, pixels.ctypes.data, weights.ctypes.data, len(weights), len(pixels),
-            variance, refine, DECISIVE, BENT, most, out.ctypes.data,
+            first, stop, variance, refine, DECISIVE, BENT, most, out.ctypes.data,
         )  # fmt: skip
 
-    return (solve_one if single else solve_batch)(run, pixels, RESULT, variance or 1.0)
+    return (solve_one if single else solve_batch)(run, pixels.shape[:2], RESULT, variance or 1.0)
 
 
 def _linear(
@@ -161,10 +161,10 @@ def _linear(
         shift_x = (theta_centre[0] - camera.cx) / camera.fx
         shift_y = (theta_centre[1] - camera.cy) / camera.fy
 
-    def run(pixels: Array, out: Array) -> None:
+    def run(out: Array, first: int, stop: int) -> None:
         native(solve_linear)(
-            w.ctypes.data, n, obj.ctypes.data, pixels.ctypes.data, len(pixels), method, tol, max_iterations,
-            shift_x, shift_y, out.ctypes.data,
+            w.ctypes.data, n, obj.ctypes.data, pixels.ctypes.data, len(pixels), first, stop, method, tol,
+            max_iterations, shift_x, shift_y, out.ctypes.data,
         )  # fmt: skip
 
-    return (solve_one if single else solve_batch)(run, pixels, LINEAR_RESULT, 1.0)
+    return (solve_one if single else solve_batch)(run, pixels.shape[:2], LINEAR_RESULT, 1.0)

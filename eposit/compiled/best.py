@@ -21,7 +21,6 @@ from eposit.compiled.layout import (
     OTHERS,
     POSE,
     PRICE,
-    RESULT,
     RMSE,
     SIZE,
     STATUS,
@@ -40,6 +39,7 @@ from eposit.compiled.observe import (
     squares_px,
     weigh,
     write_pose,
+    write_result,
 )  # fmt: skip
 from eposit.compiled.search import all_minima
 from eposit.compiled.shape import DESCRIBED, ON_A_LINE, describe
@@ -79,8 +79,9 @@ def write_others(w, known, out, place):
     """At `place` of out the minima after the lowest of `known`, then NaN."""
     told = max(min(known - 1, ALTERNATIVES), 0)
     for k in range(told):
-        write_pose(w, MINIMA + 12 * (k + 1), out, place + OTHER * k)
-        out[place + OTHER * k + 12] = w[COSTS + k + 1]
+        there = place + OTHER * k
+        write_pose(w, MINIMA + 12 * (k + 1), out, there, there + 9)
+        out[there + 12] = w[COSTS + k + 1]
     for i in range(place + OTHER * told, place + OTHER * ALTERNATIVES):
         out[i] = math.nan
 
@@ -111,9 +112,12 @@ def find_minima(w, n, whole, pixels, row, refine):
     return state
 
 
-@compiled(NOTHING, W, WHOLE, POINTER, POINTER, POINTER, WHOLE, WHOLE, NUMBER, WHOLE, NUMBER, NUMBER, NUMBER, POINTER)
-def solve_best(w, n, points, pixels, weights, m, b, variance, refine, decisive, bent, most, out):
-    """Solve b images of the same points into out (b, RESULT).
+@compiled(
+    NOTHING, W, WHOLE, POINTER, POINTER, POINTER, WHOLE, WHOLE, WHOLE, WHOLE, NUMBER, WHOLE, NUMBER, NUMBER, NUMBER,
+    POINTER,
+)  # fmt: skip
+def solve_best(w, n, points, pixels, weights, m, b, first, stop, variance, refine, decisive, bent, most, out):
+    """Solve the images from `first` to `stop` of b of the same points into out, RESULT numbers each, as in `layout`.
 
     w: workspace with LENS and INTRINSICS written. points (n, 3); pixels (b, n, 2); weights (m, 3): inverse covariances
     in px^-2 (xx, xy, yy), m = n or 1 for all points. variance: what the weights are to be divided by, px^2; 0 where it
@@ -125,17 +129,17 @@ def solve_best(w, n, points, pixels, weights, m, b, variance, refine, decisive, 
     whole = describe(w, n)
     weigh(w, n, weights, m)
     plain = m == 1 and weights[0] == 1.0 and weights[1] == 0.0 and weights[2] == 1.0
-    for row in range(b):
-        o = RESULT * row
+    for row in range(first, stop):
+        o = POSE * row
         state = find_minima(w, n, whole, pixels, row, refine)
         known, cost = int(w[KNOWN]), w[COSTS]
         out[o + STATUS], out[o + ITERATIONS], out[o + PRICE] = state, w[STEPS], cost
-        write_pose(w, MINIMA, out, o + POSE)
+        write_result(w, out, b, row)
         scale = variance if variance > 0.0 else cost / (2.0 * n - 6.0)
         inverse(w, FACTORS, HESSIAN)
         bends = known > 0 and refine == 1 and departure(w, n, max(scale, FLOOR_PX * FLOOR_PX)) > bent
         out[o + UNRELIABLE] = 1.0 if bends or (known > 0 and cost > most) else 0.0
         out[o + AMBIGUOUS] = 1.0 if known > 1 and undecided(w, n, variance, decisive) else 0.0
-        write_covariance(w, scale, out, o + COVARIANCE)
+        write_covariance(w, scale, out, COVARIANCE * b + 36 * row)
         out[o + RMSE] = math.sqrt((cost if plain or known == 0 else squares_px(w, n, MINIMA)) / n)
-        write_others(w, known, out, o + OTHERS)
+        write_others(w, known, out, OTHERS * b + OTHER * ALTERNATIVES * row)

@@ -310,7 +310,8 @@ class Expressions(ast.NodeVisitor):
             own = [self.lane(value, str(i)) if split else value for value, split in zip(values, wide, strict=True)]
             one = self._call_once(own, kernel, node)
             found.append((one,) if isinstance(one, Value) else one)
-        whole = tuple(self.lanes([one.text for one in same]) for same in zip(*found, strict=True))
+        same_place = zip(*found, strict=True)
+        whole = tuple(self.lanes([self.as_kind(one, NUMBER, node) for one in same]) for same in same_place)
         return whole[0] if len(whole) == 1 else whole
 
     def _call_once(self, values: list[Value], kernel: Kernel, node: ast.AST) -> Values:

@@ -37,7 +37,8 @@ RAYS, SEEN, INFO, FLAT, OFFSETS, SOLVER, IMAGE = 3, 6, 8, 11, 13, 16, 19
 # For the search for wrong points: weights (n, 3) of points that are there, squared residuals (n), numbers to sort (n).
 WEIGHTS, RESIDUALS, SORTED = 21, 24, 25
 
-# Results of one image: a row of numbers.
+# Results of b images: blocks one after the other, each with a row of numbers for every image. A block begins at b times
+# the place that it has for a single image, which is the constant here.
 STATUS, ITERATIONS, RMSE, PRICE, AMBIGUOUS, UNRELIABLE = 0, 1, 2, 3, 4, 5  # price: the cost of the pose
 POSE = 6  # (12) R row by row, then t, in the object's frame and unit
 LINEAR_RESULT = 18  # numbers of a method that states no more

@@ -10,7 +10,6 @@ from eposit.compiled.layout import (
     INFO,
     ITERATIONS,
     LENS,
-    LINEAR_RESULT,
     MINIMA,
     PERSPECTIVE,
     POINTS,
@@ -37,7 +36,7 @@ from eposit.compiled.observe import (
     observe,
     place,
     squares_px,
-    write_pose,
+    write_result,
 )  # fmt: skip
 from eposit.compiled.orthography import CONTRACTS, K, fixed_point, orthography, write_fixed_point
 from eposit.compiled.p3p import p3p, ray_misfit
@@ -175,15 +174,18 @@ def prepared(w, n, whole, pixels, row, method, shift_x, shift_y):
     return state
 
 
-@compiled(NOTHING, W, WHOLE, POINTER, POINTER, WHOLE, WHOLE, NUMBER, WHOLE, NUMBER, NUMBER, POINTER)
-def solve_linear(w, n, points, pixels, b, method, tol, max_iterations, shift_x, shift_y, out):
-    """Solve b images of the same points into out (b, LINEAR_RESULT). w: workspace with LENS and INTRINSICS written."""
+@compiled(NOTHING, W, WHOLE, POINTER, POINTER, WHOLE, WHOLE, WHOLE, WHOLE, NUMBER, WHOLE, NUMBER, NUMBER, POINTER)
+def solve_linear(w, n, points, pixels, b, first, stop, method, tol, max_iterations, shift_x, shift_y, out):
+    """Solve the images from `first` to `stop` of b of the same points into out, LINEAR_RESULT numbers, as in `layout`.
+
+    w: workspace with LENS and INTRINSICS written.
+    """
     place(w, n, points)
     for i in range(3 * n):  # no weights
         w[POINTS + INFO * n + i] = 0.0
     whole = describe(w, n)
-    for row in range(b):
-        o = LINEAR_RESULT * row
+    for row in range(first, stop):
+        o = POSE * row
         state = prepared(w, n, whole, pixels, row, method, shift_x, shift_y)
         if state == OK:
             state = iterate_checked(w, n, tol, max_iterations)
@@ -192,6 +194,6 @@ def solve_linear(w, n, points, pixels, b, method, tol, max_iterations, shift_x, 
         if state != OK:
             no_pose(w, MINIMA)
         out[o + STATUS], out[o + ITERATIONS] = state, w[STEPS]
-        write_pose(w, MINIMA, out, o + POSE)
+        write_result(w, out, b, row)
         squares = squares_px(w, n, MINIMA) if state == OK else math.nan
         out[o + RMSE], out[o + PRICE] = math.sqrt(squares / n), squares

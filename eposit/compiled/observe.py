@@ -13,7 +13,9 @@ from eposit.compiled.layout import (
     INFO_STEP,
     INTRINSICS,
     LENS,
+    MINIMA,
     POINTS,
+    POSE,
     RAYS,
     SEEN,
     SIZE,
@@ -97,15 +99,21 @@ def squares_px(w, n, pose):
     return total
 
 
-@compiled(NOTHING, W, WHOLE, POINTER, WHOLE)
-def write_pose(w, pose, out, place):
-    """At `place` of out (12) the pose, R row by row and then t, in the object's own frame and unit."""
+@compiled(NOTHING, W, WHOLE, POINTER, WHOLE, WHOLE)
+def write_pose(w, pose, out, R, t):
+    """At places R (9) and t (3) of out the pose in the object's own frame and unit."""
     for i in range(3):
         part = w[SIZE] * w[pose + 9 + i]
         for j in range(3):
-            out[place + 3 * i + j] = w[pose + 3 * i + j]
+            out[R + 3 * i + j] = w[pose + 3 * i + j]
             part -= w[pose + 3 * i + j] * w[CENTRE + j]
-        out[place + 9 + i] = part
+        out[t + i] = part
+
+
+@compiled(NOTHING, W, POINTER, WHOLE, WHOLE)
+def write_result(w, out, b, row):
+    """The pose at MINIMA as that of the image `row` of b."""
+    write_pose(w, MINIMA, out, POSE * b + 9 * row, (POSE + 9) * b + 3 * row)
 
 
 @compiled(NOTHING, W, WHOLE)

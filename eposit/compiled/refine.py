@@ -10,7 +10,6 @@ from eposit.compiled.layout import (
     CENTRE,
     FACTORS,
     ITERATIONS,
-    LINEAR_RESULT,
     MINIMA,
     POSE,
     PRICE,
@@ -28,7 +27,7 @@ from eposit.compiled.observe import (
     place,
     squares_px,
     weigh,
-    write_pose,
+    write_result,
 )
 from eposit.compiled.search import is_seen
 from eposit.compiled.shape import TOO_FEW_POINTS, describe
@@ -47,9 +46,10 @@ def read_pose(w, poses, first):
         w[MINIMA + 9 + i] = part / w[SIZE]
 
 
-@compiled(NOTHING, W, WHOLE, POINTER, POINTER, POINTER, WHOLE, WHOLE, POINTER, POINTER)
-def refine_poses(w, n, points, pixels, weights, m, b, starts, out):
-    """From starts (b, 12), R row by row and then t, of b images into out (b, LINEAR_RESULT).
+@compiled(NOTHING, W, WHOLE, POINTER, POINTER, POINTER, WHOLE, WHOLE, WHOLE, WHOLE, POINTER, POINTER)
+def refine_poses(w, n, points, pixels, weights, m, b, first, stop, starts, out):
+    """From starts (b, 12), R row by row and then t, of the images from `first` to `stop` of b into out, LINEAR_RESULT
+    numbers each, as in `layout`.
 
     w: workspace with LENS and INTRINSICS written. points (n, 3); pixels (b, n, 2); weights (m, 3): inverse covariances
     in px^-2 (xx, xy, yy), m = n or 1 for all points.
@@ -57,8 +57,8 @@ def refine_poses(w, n, points, pixels, weights, m, b, starts, out):
     place(w, n, points)
     whole = describe(w, n)
     weigh(w, n, weights, m)
-    for row in range(b):
-        o = LINEAR_RESULT * row
+    for row in range(first, stop):
+        o = POSE * row
         state, w[STEPS] = observe(w, n, pixels, row, IMAGE_CIRCLE_ALLOWANCE), 0.0
         if state == OK and whole == TOO_FEW_POINTS:
             state = TOO_FEW
@@ -69,6 +69,6 @@ def refine_poses(w, n, points, pixels, weights, m, b, starts, out):
         if state != OK:
             no_pose(w, MINIMA)
         out[o + STATUS], out[o + ITERATIONS] = state, w[STEPS]
-        write_pose(w, MINIMA, out, o + POSE)
+        write_result(w, out, b, row)
         squares = squares_px(w, n, MINIMA) if state == OK else math.nan
         out[o + RMSE], out[o + PRICE] = math.sqrt(squares / n), squares

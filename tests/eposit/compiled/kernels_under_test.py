@@ -2,7 +2,7 @@
 
 import math
 
-from eposit.compiled.kernel import NOTHING, NUMBER, TRUTH, WHOLE, W, compiled, part
+from eposit.compiled.kernel import NOTHING, NUMBER, POINTER, TRUTH, WHOLE, W, compiled, four, four_at_once, part, total
 
 TENTH, THREE, FAR = 0.1, 3, -7
 
@@ -93,3 +93,31 @@ def calls(w, n):
     """Another function of the same array, and a whole number where a number is wanted."""
     exchange(w, n)
     return two(w[n], n)[0] + loops(w, n)
+
+
+@compiled(NUMBER, W, WHOLE)
+def lanes(w, n):
+    """Four numbers side by side, with each other, with numbers and with whole numbers; one of them, and their sum."""
+    a = b = four(w[0], w[1], w[2], w[3])
+    a += 0.5 * b - n / b
+    b = -(a**2) / w[0] + four(w[n - 1], 2, TENTH, n)
+    return total(a * b) + b[n // 3]
+
+
+@part(NUMBER, NUMBER)
+def bent(x):
+    """One of two values, and a root."""
+    return math.sqrt(x) + min(x, 1.0) if x > 0.25 else abs(x) / 3.0
+
+
+bent_of_four = four_at_once(bent)
+
+
+@compiled(NOTHING, W, POINTER)
+def apart(w, out):
+    """At out (3, 4): a function of four numbers, the same of each of them, and one that returns several values."""
+    a = four(w[0], w[1], w[2], w[3])
+    together, each = bent_of_four(a), bent(a)
+    x, which = two(a, w[4])
+    for i in range(4):
+        out[i], out[4 + i], out[8 + i] = together[i], each[i], x[i] + 10.0 * which[i]

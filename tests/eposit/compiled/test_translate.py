@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from eposit.compiled.kernel import NUMBER, WHOLE, Kernel, W, compiled
+from eposit.compiled.kernel import NUMBER, WHOLE, Kernel, W, compiled, four
 from eposit.compiled.machine_code import native
 from eposit.compiled.translate import module_text
 from tests.eposit.compiled import kernels_under_test as kernels
@@ -27,7 +27,7 @@ def plain(kernel, w, *arguments):
     ("kernel", "more"),
     [
         (kernels.arithmetic, ()), (kernels.functions, ()), (kernels.loops, ()), (kernels.tests, (1,)),
-        (kernels.tests, (0,)), (kernels.exchange, ()), (kernels.calls, ()),
+        (kernels.tests, (0,)), (kernels.exchange, ()), (kernels.calls, ()), (kernels.lanes, ()),
     ],
     ids=lambda value: getattr(value, "name", str(value)).rpartition(".")[2],
 )  # fmt: skip
@@ -50,6 +50,17 @@ def test_a_division_by_zero_is_infinite_and_nothing_is_read_that_was_not_asked_f
     )
     short = np.array([1.0, 2.0])  # with n = 2 the third number is none of ours
     assert native(kernels.tests)(short.ctypes.data, 2, 1) == 1
+
+
+def test_each_of_four_numbers_is_treated_on_its_own():
+    rng = np.random.default_rng(2)
+    for _ in range(50):
+        w, out = rng.uniform(-3.0, 3.0, N), np.empty((3, 4))
+        native(kernels.apart)(w.ctypes.data, out.ctypes.data)
+        once = [kernels.bent.function(x) for x in w[:4]]
+        np.testing.assert_array_equal(out[:2], [once, once])
+        several = [kernels.two.function(x, w[4]) for x in w[:4]]
+        np.testing.assert_array_equal(out[2], [x + 10.0 * which for x, which in several])
 
 
 @compiled(NUMBER, W)
@@ -79,7 +90,15 @@ def returns_a_fraction(w):
     return w[0]
 
 
-@pytest.mark.parametrize("kernel", [changes_type, has_a_list, calls_numpy, returns_a_fraction])
+@compiled(NUMBER, W)
+def asks_four_at_once(w):
+    """A test of four numbers that is to decide between two blocks."""
+    if four(w[0], w[1], w[2], w[3]) > 0.0:
+        return 1.0
+    return 0.0
+
+
+@pytest.mark.parametrize("kernel", [changes_type, has_a_list, calls_numpy, returns_a_fraction, asks_four_at_once])
 def test_what_cannot_be_translated_is_refused_with_its_place(kernel):
     with pytest.raises(TypeError, match=r"test_translate\.py:\d+: "):
         module_text(kernel)
