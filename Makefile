@@ -45,6 +45,7 @@ test-full: $(SETUP)  ## adds long cases, kills, a Ray cluster, an object store, 
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check "ray>=2.9" playwright
 	@# A folder of its own: it needs another pydantic than ours.
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade --target build/moto "moto[server]>=5"
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade --target build/gcs gcp-storage-emulator
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m full
 
 check-slow: $(SETUP)  ## kills at random moments, two commands at once

@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from urllib.parse import quote, unquote, urlsplit
 
 from datasets.errors import UserError
+from datasets.store_access import ask_no_silent_metadata, patient_for_a_while
 
 if TYPE_CHECKING:
     from pyarrow.fs import FileInfo, FileSystem
@@ -80,12 +81,20 @@ class UrlPath(PosixPath):
 
     def iterdir(self) -> Generator[UrlPath, None, None]:
         """What is in this folder; nothing if there is none."""
+        if self._files.type_name == "gcs":  # lists a folder only if it has an object of its own, which none of ours has
+            yield from (self / name for name in sorted({place.partition("/")[0] for place in self.sizes()}))
+            return
         for info in self._listed(recursive=False):
             yield self / info.path.rpartition("/")[2]
 
     def glob(self, pattern: str, **_: Any) -> Generator[UrlPath, None, None]:
-        """What in this folder has a name of the pattern, which is for one folder only."""
-        yield from (path for path in self.iterdir() if fnmatch.fnmatchcase(path.name, pattern))
+        """The files in this folder whose name has the pattern, which is for one folder only."""
+        from pyarrow.fs import FileType
+
+        for info in self._listed(recursive=False):
+            name = info.path.rpartition("/")[2]
+            if info.type == FileType.File and fnmatch.fnmatchcase(name, pattern):
+                yield self / name
 
     def sizes(self) -> dict[str, int]:
         """Bytes of every file below, by its path from here."""
@@ -118,7 +127,10 @@ class UrlPath(PosixPath):
         import pyarrow as pa
 
         content = pa.memory_map(str(source)).read_buffer() if source.stat().st_size else pa.py_buffer(b"")
-        self._ask(lambda files: self._write(files, content))
+        try:
+            self._ask(lambda files: self._write(files, content))
+        except FileNotFoundError as error:  # gs:// says so of a bucket
+            raise unreachable(self, error) from error
 
     def _write(self, files: FileSystem, content: Any) -> None:
         if files.type_name != "local":
@@ -275,9 +287,11 @@ def _file_system(first: str, bucket: str) -> FileSystem:
 
     scheme, _, rest = first.partition(":")
     keys, _, options = rest.partition("?")
-    secret, query = (f"{unquote(keys)}@" if keys else ""), (f"?{unquote(options)}" if options else "")
+    secret, query = (f"{unquote(keys)}@" if keys else ""), patient_for_a_while(scheme, unquote(options))
+    if scheme == "s3" and not keys:
+        ask_no_silent_metadata()
     try:
-        url = f"{scheme}:///" if scheme == "file" else f"{scheme}://{secret}{bucket}/folder{query}"
+        url = f"{scheme}:///" if scheme == "file" else f"{scheme}://{secret}{bucket}/folder?{query}".rstrip("?")
         return FileSystem.from_uri(url)[0]
     except (OSError, ValueError, pa.ArrowException) as error:
         raise unreachable(f"{scheme}://{bucket}", error) from None

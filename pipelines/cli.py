@@ -16,7 +16,7 @@ import typer.main
 from datasets.errors import UserError
 from datasets.url_path import UnreachableError
 from pipelines.commands import compare, nightly, plan, stages, tools, transfer
-from pipelines.endings import UNFINISHED, USER_ERROR, UnfinishedError, printable, say_unexpected
+from pipelines.endings import UNFINISHED, UNREAD, USER_ERROR, UnfinishedError, printable, say_unexpected
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)  # what a disk refuses
 EXAMPLE = "Example: python -m pipelines {}"
@@ -98,9 +98,11 @@ def guarded(command: Callable[[], Any]) -> int:
     try:
         command()
     except SystemExit as stop:
+        if isinstance(stop.__context__, BrokenPipeError):  # which Typer makes exit code 1: that of what is worse
+            return _unread()
         return stop.code if isinstance(stop.code, int) else 1
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return _unread()
     except UnfinishedError as error:
         print(f"error: {printable(str(error))}", file=sys.stderr)
         return UNFINISHED
@@ -111,6 +113,12 @@ def guarded(command: Callable[[], Any]) -> int:
         print(f"error: {printable(told)}", file=sys.stderr)
         return USER_ERROR
     return 0
+
+
+def _unread() -> int:
+    """Whoever read the output has gone, as `head` does: the exit code that a shell shows of any program then."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return UNREAD
 
 
 def _told(error: Exception) -> str | None:

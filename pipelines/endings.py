@@ -17,6 +17,7 @@ USER_ERROR = 2
 UNEXPECTED = 70  # EX_SOFTWARE of sysexits.h
 UNFINISHED = 75  # EX_TEMPFAIL: the same command may succeed
 BY_SIGNAL = 128  # plus the signal's number, as a shell tells it
+UNREAD = BY_SIGNAL + 13  # SIGPIPE
 SIGNALS = tuple(name for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 LONGEST_LINE = 2000  # letters of a line of an error
 AGAIN_S = 0.05  # until a signal comes once more that could not be raised

@@ -12,9 +12,12 @@ from datasets.store.dataset import open_dataset
 from datasets.verify import verify
 from pipelines.cli import main
 from pipelines.commands import stages
+from tests.object_store import google_server as google_server
+from tests.object_store import refusing_server as refusing_server
+from tests.object_store import server as server
+from tests.object_store import silent_server as silent_server
 
 pytest.register_assert_rewrite("tests.wrong_input")
-from tests.object_store import server as server  # noqa: E402
 from tests.wrong_input import Place  # noqa: E402
 
 # Two frames of 400 x 300 px, a shard each; the board fills the middle of the picture.

@@ -50,7 +50,10 @@ def unsupported(path: Path, version: str, readable: tuple[str, ...]) -> UserErro
 def refused(path: Path, error: OSError) -> UserError:
     """What the operating system refused."""
     if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
-        return UserError(f"cannot write {path}: the folder is read-only for this user; choose another --out")
+        return UserError(
+            f"cannot write {path}: the folder is read-only for this user; make it writable, choose another --out, or "
+            "work on a copy"
+        )
     if error.errno == errno.ENOSPC:
         return UserError(f"cannot write {path}: the disk is full; free space and run again, finished shards are kept")
     return UserError(f"cannot write {path}: {os.strerror(error.errno) if error.errno else error}; choose another --out")

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def verify(folder: o.Folder, rerender: o.Rerender = 0, json: o.Json = False) -> None:
-    """Check every file that plan and manifest name, a line for each problem; print the hash of the content."""
+    """Check every file that plan and manifest name: a line for each problem and exit code 2, or the content's hash."""
     from datasets.store.dataset import open_dataset
     from datasets.verify import verify as check
     from datasets.verify.recipe import unreadable_recipe

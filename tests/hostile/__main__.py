@@ -6,6 +6,7 @@ import argparse
 import importlib
 import math
 import shutil
+import signal
 import sys
 import tempfile
 import time
@@ -20,7 +21,7 @@ from datasets.store.dataset import open_dataset
 from tests.conftest import TINY, command
 from tests.hostile.running import Outcome, adopt_orphans, run_case
 
-KINDS = ("recipes", "tables", "pictures", "linear_images", "poses", "options", "functions", "arrays")
+KINDS = ("recipes", "tables", "pictures", "linear_images", "archives", "poses", "options", "functions", "arrays")
 
 
 def main() -> int:
@@ -29,14 +30,14 @@ def main() -> int:
     parser.add_argument("--cases", type=int, default=150, help="of each kind")
     parser.add_argument("--first", type=int, default=0, help="number of the first one")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--seconds", type=float, default=math.inf, help="no case begins later than this")
+    parser.add_argument("--seconds", type=float, default=math.inf, help="all in all; no case begins later")
     parser.add_argument("--only", choices=KINDS, action="append", help="a kind; may be given again")
     parser.add_argument("--source", type=Path, help="finished dataset of the tests' tiny recipe; made if left out")
     parser.add_argument("--verbose", action="store_true", help="a line for each case")
-    asked = parser.parse_args()
+    begin, asked = time.monotonic(), parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="hostile-") as folder:
         source = warmed(Path(folder), asked.source)
-        outcomes = _all(asked, source, Path(folder) / "case")
+        outcomes = _all(asked, source, Path(folder) / "case", begin + asked.seconds)
         return 1 if _told(outcomes, asked.verbose) else 0
 
 
@@ -71,13 +72,21 @@ def _warm(source: Path, copy: Path) -> None:
             raise SystemExit(f"`{words[0]}` does not work, so that the cases would tell nothing")
 
 
-def _all(asked: argparse.Namespace, source: Path, folder: Path) -> Iterator[tuple[str, Outcome]]:
+def _heeding_ends() -> list[int]:
+    """Signals that come from now on and end nothing: no case begins after one, and what there was is told."""
+    came: list[int] = []
+    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, lambda got, _: came.append(got))
+    return came
+
+
+def _all(asked: argparse.Namespace, source: Path, folder: Path, end: float) -> Iterator[tuple[str, Outcome]]:
     adopt_orphans()
+    stopped = _heeding_ends()
     modules = {name: importlib.import_module(f"tests.hostile.kinds.{name}") for name in asked.only or KINDS}
-    end = time.monotonic() + asked.seconds
     for number in range(asked.first, asked.first + asked.cases):
         for name, module in modules.items():
-            if time.monotonic() > end:
+            if stopped or time.monotonic() > end:
                 return
             seed = f"{asked.seed} {name} {number}"
             yield f"{name} {number}", run_case(module, seed, source.resolve(), TINY, folder)
@@ -100,7 +109,7 @@ def _told(outcomes: Iterator[tuple[str, Outcome]], verbose: bool) -> int:
         faulty += bool(outcome.faults)
     for (kind, found), number in sorted(codes.items()):
         print(f"{kind}: {number} cases ended with {found or 'no code'}")
-    print(f"{count} cases, {faulty} with a fault; at most {rss >> 20} MB and {slowest:.1f} s")
+    print(f"{count} cases, {faulty} with a fault; at most {rss >> 20} MB and {slowest:.1f} s", flush=True)
     return faulty
 
 

@@ -23,6 +23,7 @@ import pytest
 
 from pipelines.endings import UNFINISHED, USER_ERROR
 from tests.conftest import command
+from tests.signals import heed_signals
 from tests.wrong_input import Place
 
 LIMIT_S = 120.0
@@ -80,6 +81,7 @@ def _child(kind: ModuleType, seed: str, source: Path, text: str, folder: Path) -
     code = 99
     try:
         os.setsid()
+        heed_signals()
         os.chdir(folder / "work")
         os.environ["TMPDIR"] = str(folder / "tmp")
         _limit()

@@ -1,20 +1,18 @@
 """Each reader is given what hypothesis thinks of: an answer or the reader's own error, nothing else.
 
-`FUZZ_SECONDS=600 python -m pytest -m slow tests/hostile/test_fuzz.py` fuzzes each reader for ten minutes.
+`FUZZ_SECONDS=600 python -m pytest -m slow tests/hostile/test_fuzz.py` fuzzes each reader for ten minutes, beside what a
+test takes to set up, and tells the number of examples, also when SIGTERM ends it.
 """
 
 from __future__ import annotations
 
-import contextlib
-import os
 import struct
-import time
 import zlib
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pytest
-from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from datasets.errors import UserError
@@ -23,13 +21,15 @@ from datasets.store.dataset import open_dataset
 from datasets.store.exr_file import DamagedExrError, read_exr, write_exr
 from datasets.store.images import decode_pixels, encode_png
 from datasets.store.linear_images import LinearImageError, read_linear
+from datasets.store.shard_file import read_rows
 from datasets.store.zip_archive import DamagedArchiveError, check_layout, read_member, write_archive
+from pipelines.report.page import write_report
 from pipelines.stages.import_poses import read_poses
 from tests.conftest import TINY
+from tests.hostile.fuzzing import fuzz as fuzz
+from tests.hostile.kinds.tables import write
 from tests.wrong_input import first
 
-SECONDS = float(os.environ.get("FUZZ_SECONDS", "60"))
-FEW = 60  # examples in the tier of every commit
 KEYS = [line.split(" = ")[0] for line in TINY.splitlines() if " = " in line]
 PNG = encode_png(np.random.default_rng(0).integers(0, 256, (30, 40)).astype(np.uint8))
 COLUMNS = ("frame_id", "q_w", "q_x", "q_y", "q_z", "tx", "ty", "tz", "t_x_mm", "t_y_mm", "t_z_mm", "r11", "status")
@@ -96,55 +96,26 @@ POSES = st.one_of(
 )
 
 
-def fuzz(strategy, read, errors, examples, seconds):
-    """Give examples to a reader, in rounds until the time is over; no other error comes out of it."""
-    end, count = time.monotonic() + seconds, 0
-    phases = [phase for phase in Phase if not seconds or phase != Phase.shrink]  # which may take longer than the rest
-    while count == 0 or time.monotonic() < end:
-
-        @settings(
-            max_examples=examples, deadline=None, database=None, suppress_health_check=list(HealthCheck), phases=phases
-        )
-        @given(strategy)
-        def once(value):
-            nonlocal count
-            count += 1
-            with contextlib.suppress(errors):
-                read(value)
-
-        once()
-    print(f"{count} examples")
+def test_recipes(fuzz):
+    fuzz(RECIPES, lambda text: parse_recipe(text, "recipe"), UserError)
 
 
-@pytest.fixture(
-    params=[pytest.param((FEW, 0.0), id="few"), pytest.param((500, SECONDS), id="long", marks=pytest.mark.slow)]
-)
-def effort(request):
-    return request.param
+def test_pictures(fuzz, capfd):
+    fuzz(PICTURES, decode_pixels, ValueError)
+    assert capfd.readouterr().err == ""
 
 
-def test_recipes(effort):
-    fuzz(RECIPES, lambda text: parse_recipe(text, "recipe"), UserError, *effort)
-
-
-def test_pictures(effort, capfd):
-    fuzz(PICTURES, decode_pixels, ValueError, *effort)
-    said = capfd.readouterr()
-    print(said.out)
-    assert said.err == ""
-
-
-def test_poses(effort, tmp_path):
+def test_poses(fuzz, tmp_path):
     path = tmp_path / "poses.csv"
 
     def read(data):
         path.write_bytes(data)
         read_poses(path)
 
-    fuzz(POSES, read, UserError, *effort)
+    fuzz(POSES, read, UserError)
 
 
-def test_linear_images(effort, tmp_path):
+def test_linear_images(fuzz, tmp_path):
     path = tmp_path / "a.exr"
     window = np.array([0, 0], np.int32), np.array([7, 5], np.int32)
     header = {"key": "k", "background": 0.25, "dataWindow": window, "displayWindow": window}
@@ -155,10 +126,10 @@ def test_linear_images(effort, tmp_path):
         read_exr(path)
         read_linear(path, "k")
 
-    fuzz(_edits(path.read_bytes()), read, (DamagedExrError, LinearImageError, OSError), *effort)
+    fuzz(_edits(path.read_bytes()), read, (DamagedExrError, LinearImageError, OSError))
 
 
-def test_archives(effort, tmp_path):
+def test_archives(fuzz, tmp_path):
     path, names = tmp_path / "a.zip", ["000000.exr", "000001.exr"]
     write_archive(path, names, [b"one", b"other"])
 
@@ -167,11 +138,11 @@ def test_archives(effort, tmp_path):
         check_layout(path, names)
         assert [read_member(path, names, number) for number in range(2)] == [b"one", b"other"]
 
-    fuzz(_edits(path.read_bytes()), read, DamagedArchiveError, *effort)
+    fuzz(_edits(path.read_bytes()), read, DamagedArchiveError)
 
 
 @pytest.mark.parametrize("table", ["frames", "detections", "scores"])
-def test_tables(table, effort, root):
+def test_tables(table, fuzz, root):
     dataset = open_dataset(root)
     path: Path = first(root, table)
 
@@ -179,4 +150,49 @@ def test_tables(table, effort, root):
         path.write_bytes(data)
         dataset.read_shard(path)
 
-    fuzz(_edits(path.read_bytes()), read, UserError, *effort)
+    fuzz(_edits(path.read_bytes()), read, UserError)
+
+
+CELLS = st.one_of(st.none(), st.booleans(), st.floats(), st.integers(), st.text(max_size=20), st.binary(max_size=20))
+CHANGES = st.lists(
+    st.tuples(
+        st.sampled_from(["frames", "keypoints", "detections", "estimates", "scores"]),
+        st.integers(0, 60),  # column
+        st.one_of(st.none(), st.integers(0, 20)),  # row; every one
+        CELLS,
+    ),
+    min_size=1,
+    max_size=3,
+)
+
+
+def _changed(rows, column, row, value):
+    """A table with another value in a column, in one row or in all; null where the column cannot hold it."""
+    index = column % rows.num_columns
+    values = rows.column(index).to_pylist()
+    values = [value if row is None or i == row % len(values) else old for i, old in enumerate(values)]
+    field = rows.schema.field(index).with_nullable(True)
+    try:
+        array = pa.array(values, field.type)
+    except (pa.ArrowException, OverflowError, ValueError, TypeError):
+        array = pa.nulls(len(values), field.type)
+    return rows.set_column(index, field, array)
+
+
+def test_inputs_of_the_report(fuzz, root):
+    """Tables with right digests and wrong values."""
+    paths = {table: first(root, table) for table in ("frames", "keypoints", "detections", "estimates", "scores")}
+    sound = {path: path.read_bytes() for path in paths.values()}
+    rows = {path: read_rows(path) for path in sound}
+
+    def report(changes):
+        for path, data in sound.items():
+            path.write_bytes(data)
+        for table, column, row, value in changes:
+            path = paths[table]
+            metadata = rows[path].schema.metadata
+            footer = {key.decode(): text.decode() for key, text in metadata.items()}
+            write(path, _changed(read_rows(path).replace_schema_metadata(None), column, row, value), footer)
+        write_report(open_dataset(root))
+
+    fuzz(CHANGES, report, UserError, examples=2)

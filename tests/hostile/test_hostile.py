@@ -19,7 +19,7 @@ def outcome(*words):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "kind",
-    ["recipes", "tables", "pictures", "linear_images", "poses", "options", "functions", "arrays"],
+    ["recipes", "tables", "pictures", "linear_images", "archives", "poses", "options", "functions", "arrays"],
 )
 def test_a_hundred_and_thirty_inputs(kind):
     done = outcome("tests.hostile", "--only", kind, "--cases", "130")

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from pipelines.cli import guarded
-from pipelines.endings import UNEXPECTED, UNFINISHED
+from pipelines.endings import UNEXPECTED, UNFINISHED, UNREAD
 from pipelines.stages import generate
 from tests.signals import heed_signals
 from tests.wrong_input import first, left_behind
@@ -27,9 +27,18 @@ MOMENTS = 20  # of each signal
 def started(*words, **options):
     return subprocess.Popen(
         [sys.executable, "-m", "pipelines", *map(str, words)],
-        cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-        **({"preexec_fn": heed_signals} | options),
+        cwd=ROOT, stderr=subprocess.PIPE, text=True,
+        **({"stdout": subprocess.DEVNULL, "preexec_fn": heed_signals} | options),
     )  # fmt: skip
+
+
+@pytest.mark.parametrize("words", [("recipes",), ("recipes", "--json"), ("run", "--help")])
+def test_a_reader_that_has_gone_is_no_result(words):
+    unread, output = os.pipe()
+    os.close(unread)
+    process = started(*words, stdout=output)
+    os.close(output)
+    assert (process.communicate(timeout=PATIENCE_S)[1], process.returncode) == ("", UNREAD)
 
 
 def limited():

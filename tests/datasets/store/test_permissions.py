@@ -49,7 +49,9 @@ def test_a_new_dataset_in_a_read_only_folder(public, cli):
     lock(public.folder, 0o555)
     with another_user():
         outcome = cli(*arguments)
-    assert_one_sentence(outcome.code, outcome.err, "the folder is read-only for this user; choose another --out")
+    assert_one_sentence(
+        outcome.code, outcome.err, "read-only for this user; make it writable, choose another --out, or work"
+    )
     assert not public.new().exists()
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from datasets.errors import UserError
+from datasets.url_path import dataset_folder
 from pipelines.engines.ray import RayEngine
 from tests.conftest import command
 from tests.timeless import timeless
@@ -130,11 +131,18 @@ def test_a_task_whose_node_is_killed_runs_again_on_another(engine, cluster, seco
     assert nodes == {0: survivor, 1: survivor}
 
 
-def test_a_run_loses_one_of_two_nodes_and_has_the_content_of_a_local_one(cluster, second, tiny, tmp_path, content):
-    recipe, local, root = tmp_path / "ten.toml", tmp_path / "local", tmp_path / "ray"
+@pytest.mark.parametrize("place", ["folder", "store"])
+def test_a_run_loses_one_of_two_nodes_and_has_the_content_of_a_local_one(
+    place, cluster, second, tiny, tmp_path, content, request
+):
+    """In a store, too, whose URL tells the nodes the access keys."""
+    recipe, local, out = tmp_path / "ten.toml", tmp_path / "local", str(tmp_path / "ray")
+    if place == "store":
+        out = f"s3://a:b@bucket/ray/demo?{request.getfixturevalue('server')}"
+    root = dataset_folder(out)
     recipe.write_text(tiny[0].replace("step = 90", "step = 10"))
     assert command("run", recipe, "--out", local, "-q") == 0
-    words = ["run", recipe, "--out", root, "-q", "--engine", "ray", "--ray-address", cluster.address]
+    words = ["run", recipe, "--out", out, "-q", "--engine", "ray", "--ray-address", cluster.address]
     process = subprocess.Popen([sys.executable, "-m", "pipelines", *map(str, words)], cwd=ROOT)
     wait_until(lambda: len(list((root / "frames").glob("[!.]*"))) >= BEFORE_KILL or process.poll() is not None)
     cluster.remove_node(second, allow_graceful=False)

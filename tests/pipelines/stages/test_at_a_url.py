@@ -83,7 +83,7 @@ def test_every_stage_works_at_a_url(root, stored, tiny, content):
         (folder / "report.html").stat().st_size for folder in (write_report(open_dataset(root)).parent, stored)
     )
     assert there == pytest.approx(local, rel=0.01)  # it tells no paths
-    damaged = next(stored.glob("scores")) / first(root, "scores").name
+    damaged = stored / "scores" / first(root, "scores").name
     write_text(damaged, "no shard")
     (stored / "masters" / "000000.exr").unlink()
     assert {str(problem.path) for problem in verify(dataset)[1]} == {str(damaged), f"{stored}/masters/000000.exr"}
