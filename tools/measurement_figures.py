@@ -169,6 +169,12 @@ def single_poses(results: Results) -> str:
     )
 
 
+def cramer_rao(results: Results) -> str:
+    """Smallest and largest share of the bound over the components, pinhole and fish-eye."""
+    rows = [row for row in results.paper_rows("paper", "over the Cramer-Rao bound") if row[1] == "default"]
+    return span((float(cell.split()[0]) for row in rows for cell in row[2:]), ".2f")
+
+
 def confidence_regions(results: Results) -> str:
     """How often regions hold the truth."""
     rows = results.paper_rows("paper", "95 % region holds the truth")

@@ -113,8 +113,11 @@ MEASUREMENTS = (
     ),
     Measurement(
         "cramer-rao",
-        "noise of 0.4 px on the paper's helix, error over its Cramer-Rao bound",
-        ("python -m pytest tests/eposit/test_solver.py",),
+        "noise of 0.4 px on the paper's helix, median error over that of the Cramer-Rao bound, pinhole and fish-eye, "
+        "six components",
+        (PAPER_BEYOND,),
+        figures.cramer_rao,
+        figures.cramer_rao,
     ),
     Measurement(
         "rendering",

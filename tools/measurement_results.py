@@ -90,40 +90,40 @@ class Results:
         return [row for row in json.loads(self.outputs[0])["figures"] if row["ours"].startswith(start)]
 
     def paper_rows(self, name: str, title: str) -> list[list[str]]:
-        """Rows of the first table of the paper's page in the folder `name` that comes after a heading with `title`."""
+        """Rows of the first table of the paper's page in the folder `name` with `title` in its caption."""
         page = _Tables()
         page.feed((self.folder / name / "paper.html").read_text(encoding="utf-8"))
-        return next(rows for heading, rows in page.tables if title in heading)
+        return next(rows for caption, rows in page.tables if title in caption)
 
 
 class _Tables(HTMLParser):
-    """The tables of a page, each with the heading before it; a table's head has no `td` and is left out."""
+    """The tables of a page, each with its caption; a table's head has no `td` and is left out."""
 
     def __init__(self) -> None:
         super().__init__()
         self.tables: list[tuple[str, list[list[str]]]] = []
-        self.heading, self.inside = "", ""
+        self.inside = ""
 
-    def handle_starttag(self, tag: str, attrs: object) -> None:
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.inside = tag
-        if tag == "h3":
-            self.heading = ""
-        elif tag == "table":
-            self.tables.append((self.heading, []))
+        if tag == "table":
+            self.tables.append(("", []))
         elif tag == "tr":
             self.tables[-1][1].append([])
-        elif tag == "td":
+        elif tag == "td" or (tag == "th" and ("scope", "row") in attrs):
+            self.inside = "td"
             self.tables[-1][1][-1].append("")
 
     def handle_endtag(self, tag: str) -> None:
         self.inside = ""
         if tag == "table":
-            heading, rows = self.tables.pop()
-            self.tables.append((heading, [row for row in rows if row]))
+            caption, rows = self.tables.pop()
+            self.tables.append((caption, [row for row in rows if row]))
 
     def handle_data(self, data: str) -> None:
-        if self.inside == "h3":
-            self.heading += data
+        if self.inside == "caption":
+            caption, rows = self.tables.pop()
+            self.tables.append((caption + data, rows))
         elif self.inside == "td":
             self.tables[-1][1][-1][-1] += data
 

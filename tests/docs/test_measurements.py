@@ -6,6 +6,8 @@ from dataclasses import asdict
 
 import pytest
 
+from pipelines.pages.sections import Table
+from pipelines.pages.template import rendered
 from tests.docs.documents import ROOT, RUN, wrong_options
 from tools import measurement_figures as figures
 from tools import measurements
@@ -122,14 +124,18 @@ def test_costly_ones_are_left_out_unless_asked_for(monkeypatch):
     assert names(["memory"], False) == ["memory"]
 
 
-def test_a_table_of_the_papers_page_is_read_by_its_heading(tmp_path):
-    (tmp_path / "paper").mkdir()
-    (tmp_path / "paper" / "paper.html").write_text(
-        "<h3>First</h3><table><tr><th>n</th></tr><tr><td>1</td></tr></table>"
-        "<h3>Share &amp; more</h3>\n<table>\n<tr><th>a</th><th>b</th></tr>\n"
-        "<tr><td>95 [94, 96] %</td><td></td></tr>\n</table>"
+def test_a_table_of_the_papers_page_is_read_by_its_title(tmp_path):
+    tables = [
+        Table("First", ("n",), (("1",),)),
+        Table("Share & more", ("camera", "a", "b"), (("pinhole", "95 [94, 96] %", ""),)),
+    ]
+    template = tmp_path / "tables.html"
+    template.write_text(
+        '{% import "pieces.html" as pieces %}{% for item in tables %}{{ pieces.table(item) }}{% endfor %}'
     )
-    assert Results(tmp_path, ()).paper_rows("paper", "Share & more") == [["95 [94, 96] %", ""]]
+    (tmp_path / "paper").mkdir()
+    (tmp_path / "paper" / "paper.html").write_text(rendered(template, tables=tables))
+    assert Results(tmp_path, ()).paper_rows("paper", "Share & more") == [["pinhole", "95 [94, 96] %", ""]]
 
 
 def test_a_span_is_one_number_where_its_ends_read_alike():
