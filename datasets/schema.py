@@ -175,6 +175,13 @@ _AMBIGUOUS = _field(
     "whether another pose is nearly as likely on the same points. Null: no pose, or the solver does not tell",
 )
 
+_UNRELIABLE = _field(
+    "covariance_unreliable",
+    pa.bool_(),
+    "whether the cost is no parabola as the covariance states it, or contradicts the points' stated errors. "
+    "Null: no pose, or the solver does not tell",
+)
+
 ESTIMATES = pa.schema(
     [
         *_KEY,
@@ -189,12 +196,7 @@ ESTIMATES = pa.schema(
             "6 x 6, row by row: rotation vector on the left in the camera frame, rad; then t, mm. Null: none stated",
         ),
         _AMBIGUOUS,
-        _field(
-            "covariance_unreliable",
-            pa.bool_(),
-            "whether the cost is no parabola as the covariance states it, or contradicts the points' stated errors. "
-            "Null: no pose, or the solver does not tell",
-        ),
+        _UNRELIABLE,
     ]
 )
 
@@ -240,6 +242,7 @@ SCORES = pa.schema(
             "hidden: a solution",
         ),
         _AMBIGUOUS,
+        _UNRELIABLE,
     ]
 )
 

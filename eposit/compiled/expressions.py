@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import ast
 import math
-import struct
-from typing import Any, NamedTuple
 
-from eposit.compiled.kernel import LANES, NUMBER, NUMBERS, POINTER, TRUTH, TRUTHS, WHOLE, Kernel, Returns
+from eposit.compiled.kernel import LANES, NUMBER, NUMBERS, POINTER, TRUTH, TRUTHS, WHOLE, Kernel
+from eposit.compiled.operands import Operands, Value, Values, common, literal, llvm_type
 
 # Functions of numbers: name in the assembly language, number of arguments. The C library has those without `llvm`.
 FUNCTIONS = {
@@ -27,105 +26,13 @@ COMPARISONS = {
 }  # fmt: skip
 
 
-class Value(NamedTuple):
-    """An operand and its type."""
-
-    kind: str
-    text: str
-
-
-Values = Value | tuple[Value, ...]
-
-
-def llvm_type(returns: Returns) -> str:
-    """The type of what a function returns."""
-    return returns if isinstance(returns, str) else "{" + ", ".join(returns) + "}"
-
-
-def literal(value: Any) -> Value:
-    """A constant: truth value, whole number or number."""
-    if isinstance(value, bool):
-        return Value(TRUTH, str(value).lower())
-    if isinstance(value, int):
-        return Value(WHOLE, str(value))
-    if isinstance(value, float):
-        return Value(NUMBER, "0x" + struct.pack(">d", value).hex())
-    raise TypeError(f"a kernel has numbers and truth values as constants, not {value!r}")
-
-
-class Expressions(ast.NodeVisitor):
+class Expressions(Operands):
     """Values of expressions, with the lines that compute them."""
-
-    def __init__(self, kernel: Kernel):
-        self.kernel, self.globals = kernel, kernel.function.__globals__
-        self.variables: dict[str, Value] = {}  # type and place of each
-        self.slots: list[str] = []  # lines that make places for variables
-        self.lines: list[str] = []
-        self.called: list[Kernel] = []
-        self._count = 0
-
-    def line(self, text: str) -> None:
-        """Add one line."""
-        self.lines.append(text)
-
-    def fresh(self) -> str:
-        """A new name."""
-        self._count += 1
-        return f"v{self._count}"
-
-    def assigned(self, kind: str, text: str) -> Value:
-        """The value of one operation."""
-        name = "%" + self.fresh()
-        self.line(f"{name} = {text}")
-        return Value(kind, name)
-
-    def slot(self, kind: str) -> str:
-        """A place for a value of this type."""
-        name = "%" + self.fresh()
-        self.slots.append(f"{name} = alloca {kind}")
-        return name
-
-    def label(self, name: str) -> None:
-        """Begin a new block of lines, into which the last one leads."""
-        self.line(f"br label %{name}")
-        self.line(f"{name}:")
 
     def value(self, node: ast.expr) -> Value:
         """A single value."""
         found = self.visit(node)
         return found if isinstance(found, Value) else self.refuse(node, "has several values where one is wanted")
-
-    def as_kind(self, value: Value, kind: str, node: ast.AST) -> str:
-        """The operand of a value as another type: whole numbers become numbers."""
-        if value.kind == kind:
-            return value.text
-        if (value.kind, kind) == (WHOLE, NUMBER):
-            if value.text.lstrip("-").isdigit():
-                return literal(float(value.text)).text
-            return self.assigned(NUMBER, f"sitofp i64 {value.text} to double").text
-        if kind == NUMBERS and value.kind in (NUMBER, WHOLE):
-            return self.lanes([self.as_kind(value, NUMBER, node)] * LANES).text
-        return self.refuse(node, f"is of type {value.kind} where {kind} is wanted")
-
-    def lanes(self, operands: list[str]) -> Value:
-        """Four numbers side by side."""
-        whole = "poison"
-        for i, operand in enumerate(operands):
-            whole = self.assigned(NUMBERS, f"insertelement {NUMBERS} {whole}, double {operand}, i64 {i}").text
-        return Value(NUMBERS, whole)
-
-    def lane(self, value: Value, i: str) -> Value:
-        """One of four numbers."""
-        return self.assigned(NUMBER, f"extractelement {NUMBERS} {value.text}, i64 {i}")
-
-    def refuse(self, node: ast.AST, why: str) -> Any:
-        """Stop with the place in the source."""
-        code = self.kernel.function.__code__
-        raise TypeError(f"{code.co_filename}:{getattr(node, 'lineno', 0)}: {ast.unparse(node)!r} {why}")
-
-    def generic_visit(self, node: ast.AST) -> Any:
-        """Refuse what kernels do not have."""
-        self.refuse(node, "is nothing that a kernel can have; see eposit.compiled.translate")
 
     def visit_Constant(self, node: ast.Constant) -> Value:
         """A constant."""
@@ -184,7 +91,7 @@ class Expressions(ast.NodeVisitor):
         if type(operator) not in OPERATIONS:
             self.generic_visit(node)
         for_whole, for_numbers = OPERATIONS[type(operator)]
-        kind = _common(left, right, whole=bool(for_whole))
+        kind = common(left, right, whole=bool(for_whole))
         name = for_whole if kind == WHOLE else for_numbers
         if not name:
             self.refuse(node, "has an operation that its numbers do not have")
@@ -195,7 +102,7 @@ class Expressions(ast.NodeVisitor):
         """A square as a product, else by the C library."""
         base = self.value(node.left)
         if isinstance(node.right, ast.Constant) and node.right.value == 2:
-            return self.operation(ast.Mult(), base, base if base.kind != WHOLE else self._number(base, node), node)
+            return self.operation(ast.Mult(), base, base, node)
         return self._call_number("pow", [base, self.value(node.right)], node)
 
     def visit_Compare(self, node: ast.Compare) -> Value:
@@ -218,7 +125,7 @@ class Expressions(ast.NodeVisitor):
 
     def _compared(self, operator: ast.cmpop, left: Value, right: Value, node: ast.AST) -> Value:
         signed, ordered = COMPARISONS[type(operator)]
-        kind = _common(left, right)
+        kind = common(left, right)
         if kind == WHOLE:
             return self.assigned(TRUTH, f"icmp {signed} i64 {left.text}, {right.text}")
         a, b = self.as_kind(left, kind, node), self.as_kind(right, kind, node)
@@ -242,7 +149,7 @@ class Expressions(ast.NodeVisitor):
         """One of two values of the same type; the other is not computed. In each of four lanes its own one of both."""
         truth = self.value(node.test)
         if truth.kind == TRUTHS:
-            return self._chosen(truth, self.value(node.body), self.value(node.orelse), node)
+            return self.chosen(truth, self.value(node.body), self.value(node.orelse), node)
         yes, no, end = self.fresh(), self.fresh(), self.fresh()
         test = self.as_kind(truth, TRUTH, node)
         self.line(f"br i1 {test}, label %{yes}, label %{no}")
@@ -285,16 +192,7 @@ class Expressions(ast.NodeVisitor):
         """As Python: the first of two, unless the second is beyond it."""
         first, second = values
         beyond = self._compared(ast.Lt() if name == "min" else ast.Gt(), second, first, node)
-        return self._chosen(beyond, second, first, node)
-
-    def _chosen(self, test: Value, yes: Value, no: Value, node: ast.AST) -> Value:
-        """One of two values that are both computed."""
-        kind = NUMBERS if test.kind == TRUTHS else _common(yes, no)
-        a, b = self.as_kind(yes, kind, node), self.as_kind(no, kind, node)
-        return self.assigned(kind, f"select {test.kind} {test.text}, {kind} {a}, {kind} {b}")
-
-    def _number(self, value: Value, node: ast.AST) -> Value:
-        return Value(NUMBER, self.as_kind(value, NUMBER, node))
+        return self.chosen(beyond, second, first, node)
 
     def _call_kernel(self, node: ast.Call, kernel: Kernel) -> Values:
         """Once, or once for each lane where four numbers are given for one."""
@@ -326,10 +224,3 @@ class Expressions(ast.NodeVisitor):
         whole = self.assigned("struct", call).text
         kind = llvm_type(kernel.returns)
         return tuple(self.assigned(one, f"extractvalue {kind} {whole}, {i}") for i, one in enumerate(kernel.returns))
-
-
-def _common(a: Value, b: Value, whole: bool = True) -> str:
-    """The type of two values together."""
-    if NUMBERS in (a.kind, b.kind):
-        return NUMBERS
-    return WHOLE if whole and a.kind == b.kind == WHOLE else NUMBER

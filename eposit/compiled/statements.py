@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import ast
 
-from eposit.compiled.expressions import Expressions, Value, Values, llvm_type
+from eposit.compiled.expressions import Expressions
 from eposit.compiled.kernel import NOTHING, WHOLE, Kernel
+from eposit.compiled.operands import Value, Values, llvm_type
 
 
 class Body(Expressions):

@@ -18,8 +18,9 @@ import ast
 from functools import cache
 from pathlib import Path
 
-from eposit.compiled.expressions import FUNCTIONS, FUNCTIONS_OF_FOUR, llvm_type
+from eposit.compiled.expressions import FUNCTIONS, FUNCTIONS_OF_FOUR
 from eposit.compiled.kernel import NOTHING, NUMBERS, Kernel
+from eposit.compiled.operands import llvm_type
 from eposit.compiled.statements import Body
 
 

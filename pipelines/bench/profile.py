@@ -1,4 +1,7 @@
-"""Where the time of one frame goes, step by step, each beside the least that the step has to do."""
+"""Where the time of one frame goes, step by step, each beside the least that the step has to do.
+
+In processor time, of all threads together: other programs do not change it.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +31,7 @@ from pipelines.detection.finders import SUBPIX_STOP, SUBPIX_WINDOW, find_board
 from pipelines.detection.first_map import first_map
 from pipelines.detection.statuses import PointStatus
 from pipelines.detection.textured_region import textured_region
-from pipelines.timing import in_turn
+from pipelines.timing import Times, in_turn
 
 PART = "profile"
 CLASSIC_FLAGS = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
@@ -40,8 +43,8 @@ def measure(recipe: Recipe, poses: int) -> Iterator[Row]:
     frame = chosen_frames(recipe, 1)[recipe.cameras[-1].name][0]
     with tempfile.TemporaryDirectory() as folder:
         for name, call, floor_name, floor in _steps(recipe, frame, Path(folder)):
-            own, that = in_turn(call, floor, repeats=7)
-            yield compared(PART, f"{frame.camera.name}: {name}", own, floor_name, that)
+            own, that = (Times(times.cpu, times.cpu) for times in in_turn(call, floor, repeats=7))
+            yield compared(PART, f"{frame.camera.name}: {name}, processor time", own, floor_name, that)
 
 
 def _steps(recipe: Recipe, frame: Frame, folder: Path) -> Iterator[tuple[str, Call, str, Call]]:

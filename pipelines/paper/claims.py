@@ -76,11 +76,6 @@ def holds_if(
     return lambda measured: Verdict.HOLDS if condition(measured) else otherwise
 
 
-def always(verdict: Verdict) -> Callable[[object], Verdict]:
-    """The rule of a claim whose verdict is a matter of reading, whatever is measured."""
-    return lambda measured: verdict
-
-
 def by_both(figure: Callable[..., str], *details: object) -> tuple[Callable[..., str], Callable[..., str]]:
     """The figures by the equations and as released, of a function of what was measured, the method and details."""
 

@@ -65,6 +65,9 @@ def _failures(item: Series) -> Iterator[str]:
     if np.any(item.ambiguous):
         told = f"{item.name} says of {counted(int(item.ambiguous.sum()), 'pose')} that the points allow another as well"
         yield f"{told}: frames {_listed(sorted(set(item.frame_id[item.ambiguous].tolist())))}"
+    if np.any(item.unreliable) and item.key["assumed_camera"] == EXACT:  # points contradict any other camera
+        told = f"{item.name} says of {counted(int(item.unreliable.sum()), 'pose')} that its covariance is unreliable"
+        yield f"{told}: frames {_listed(sorted(set(item.frame_id[item.unreliable].tolist())))}"
 
 
 def _biased(run: Run, item: FramePoints) -> Iterator[str]:

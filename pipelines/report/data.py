@@ -31,7 +31,8 @@ ERRORS = {
 SIGNED = tuple(name for name in ERRORS if name[:2] in ("rx", "ry", "rz", "tx", "ty", "tz"))
 SETTING = ("solver", "point_source", "assumed_camera", "point_set")
 NORMALISED = tuple(f"{component}_normalised" for component in COMPONENTS)
-SCORE_COLUMNS = ("frame_id", *SETTING, "status", "failure_reason", "gross_failure", "ambiguous", *ERRORS, *NORMALISED)
+FLAGS = ("gross_failure", "ambiguous", "covariance_unreliable")
+SCORE_COLUMNS = ("frame_id", *SETTING, "status", "failure_reason", *FLAGS, *ERRORS, *NORMALISED)
 EXACT = "exact"  # the assumed camera that is the true one
 
 
@@ -47,6 +48,7 @@ class Series:
     status: NDArray[np.str_]  # HIDDEN where no pose could be found, as the target cannot be seen
     gross: Mask
     ambiguous: Mask  # poses of which the solver says that another is nearly as likely
+    unreliable: Mask  # poses of which the solver says that the stated covariance is not to be relied on
 
     @property
     def failed(self) -> Mask:
@@ -80,6 +82,7 @@ class Cell:
     failed: int
     gross: int
     ambiguous: int
+    unreliable: int
     failed_rate: Interval
     gross_rate: Interval
     rotation_deg: Interval | None  # medians of absolute errors, None if all failed
@@ -108,6 +111,7 @@ def _joined(parts: Sequence[Series]) -> Series:
         np.concatenate([part.status for part in parts]),
         np.concatenate([part.gross for part in parts]),
         np.concatenate([part.ambiguous for part in parts]),
+        np.concatenate([part.unreliable for part in parts]),
     )
 
 
@@ -119,13 +123,11 @@ def _series_of(scores: pa.Table) -> list[Series]:
         errors = dict(zip(ERRORS, numbers(part, *ERRORS).T, strict=True))
         outcome = zip(part["status"].to_pylist(), part["failure_reason"].to_pylist(), strict=True)
         status = np.array([HIDDEN if reason == HIDDEN else status for status, reason in outcome], str)
-        gross, ambiguous = (
-            np.array([bool(value) for value in part[name].to_pylist()], bool) for name in ("gross_failure", "ambiguous")
-        )
+        flags = (np.array([bool(value) for value in part[name].to_pylist()], bool) for name in FLAGS)
         normalised = numbers(part, *NORMALISED)
         named: dict[str, str] = dict(zip(SETTING, key, strict=True))
         frame_id = part["frame_id"].to_numpy()
-        found.append(Series(" ".join(key), named, frame_id, errors, normalised, status, gross, ambiguous))
+        found.append(Series(" ".join(key), named, frame_id, errors, normalised, status, *flags))
     return found
 
 
@@ -173,6 +175,7 @@ def _cell(item: Series, camera: str, by_frame: NDArray[np.intp]) -> Cell:
         int(failed.sum()),
         int(gross.sum()),
         int(item.ambiguous[by_frame].sum()),
+        int(item.unreliable[by_frame].sum()),
         rate(failed),
         rate(gross),
         _median(errors["rotation_error_deg"]) if solved else None,

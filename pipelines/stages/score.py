@@ -64,7 +64,7 @@ def run_shard(dataset: Dataset, estimates: Path) -> None:
     euler = np.degrees(euler_error_rad(found.R, true.R))
     failed = rows["status"].to_numpy(zero_copy_only=False) != Status.OK
     columns = {name: rows[name] for name in KEY}
-    columns["ambiguous"] = rows["ambiguous"]
+    columns |= {name: rows[name] for name in ("ambiguous", "covariance_unreliable")}
     hidden = is_hidden(dataset, estimates, rows)
     reasons = failure_reasons(dataset, estimates, rows)
     columns["failure_reason"] = [

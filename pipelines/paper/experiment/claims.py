@@ -9,11 +9,11 @@ import numpy as np
 
 from eposit import Status
 from eposit.arrays import Array, Mask
-from pipelines.paper.claims import Statement, Verdict, always
+from pipelines.paper.claims import Statement, Verdict
 from pipelines.paper.experiment.calibration import Calibration
 from pipelines.paper.experiment.figures import LIMIT_RAD, LIMITS_MM, PAPER_PX
 from pipelines.paper.experiment.pictures import HARD, MethodResult, Pictures
-from pipelines.paper.experiment.times import Cost
+from pipelines.paper.experiment.times import PAPER_DETECT_MS, PAPER_SOLVE_MS, Cost
 from pipelines.statistics import bootstrap, mean, median
 
 PART = "experiment"
@@ -167,6 +167,15 @@ def _time(experiment: Experiment) -> str:
     return f"without {experiment.cost.eposit.text(2, 'ms')}; detection: {detection}"
 
 
+def _time_verdict(experiment: Experiment) -> Verdict:
+    """Whether the two numbers are reached, and as printed or the other way round."""
+    cost = experiment.cost
+    alone, detection = cost.eposit.value, min(time.value for time in cost.detection.values())
+    if alone + detection <= PAPER_SOLVE_MS and alone <= PAPER_DETECT_MS:
+        return Verdict.HOLDS
+    return Verdict.PARTLY if alone <= PAPER_SOLVE_MS else Verdict.FAILS
+
+
 def _ordinary_turns(experiment: Experiment, result: MethodResult) -> Array:
     return experiment.ordinary(result.turn_rad(experiment.found.pictures.cam_from_obj))
 
@@ -216,8 +225,9 @@ STATEMENTS: tuple[Statement[Experiment], ...] = (
     Statement(
         PLACE, "time of EPOSIT with and without feature detection, 3.0 GHz",
         "0.1 ms with, 7.6 ms without (the wrong way round: detection takes time)", _time,
-        lambda experiment: f"without {experiment.cost.released.text(2, 'ms')}", always(Verdict.PARTLY),
-        "The numbers have changed places in the paper. Ours are single calls from Python on pictures of 1600 x 1200 "
+        lambda experiment: f"without {experiment.cost.released.text(2, 'ms')}", _time_verdict,
+        "The numbers have changed places in the paper: EPOSIT alone is to take 0.1 ms at most. "
+        "Ours are single calls from Python on pictures of 1600 x 1200 "
         "px, with every check; in batches a pose takes microseconds.", PART,
     ),
     Statement(

@@ -12,6 +12,7 @@ from pipelines.paper.claims import Claim, Verdict, judged
 from pipelines.paper.command import markdown, reproduce
 from pipelines.paper.derivation import advantages, choice, ratios
 from pipelines.paper.problems import OBJECT, bounds, information
+from pipelines.paper.simulation import principal_point as centres
 from pipelines.paper.simulation.comparison import Alike, judged_alike, median_of, told_alike
 from pipelines.paper.simulation.fisheye import fisheye
 from pipelines.paper.simulation.precision import METHODS, precision
@@ -78,6 +79,30 @@ def test_the_largest_difference_is_that_of_a_frame_and_not_a_mean():
     claim = by_text["The largest difference of translation is below 1.9 mm"]
     assert claim.verdict == Verdict.PARTLY  # in x and y, not in z
     assert "largest x, y 1.5 mm, z 4 mm; means 0.25 and 0.67 mm" in claim.equations
+
+
+@pytest.mark.parametrize(
+    ("inside_mm", "everywhere_mm", "verdict"),
+    [(1.0, 1.0, Verdict.HOLDS), (1.0, -65.0, Verdict.PARTLY), (2.0, 1.0, Verdict.FAILS)],
+)
+def test_the_image_centre_is_judged_inside_theta_and_everywhere(inside_mm, everywhere_mm, verdict, monkeypatch):
+    monkeypatch.setattr(centres, "_everywhere", lambda: (0.0, everywhere_mm))
+    values = np.zeros((2, 3, 6))
+    values[1, 2, 4] = inside_mm
+    found = Differences({(method, lens): values for method in METHODS for lens in simulation.LENSES})
+    by_text = {claim.text: claim for claim in judged(STATEMENTS, found)}
+    assert by_text["The principal point can be substituted by the image centre"].verdict == verdict
+
+
+@pytest.mark.parametrize(
+    ("near", "far", "verdict"),
+    [(0.01, 0.02, Verdict.HOLDS), (0.01, 0.06, Verdict.PARTLY), (0.03, 0.06, Verdict.FAILS)],
+)
+def test_ratios_are_equal_where_they_differ_less_than_the_paper_accepts(near, far, verdict, monkeypatch):
+    monkeypatch.setattr(centres, "_ratio_apart", lambda turn_deg: near if turn_deg == 0.0 else far)
+    values = {(method, lens): np.zeros((1, 1, 6)) for method in METHODS for lens in simulation.LENSES}
+    (claim,) = (one for one in judged(STATEMENTS, Differences(values)) if one.section == "II-B")
+    assert claim.verdict == verdict
 
 
 def outcome_with(x_mm: float) -> simulation.Outcome:

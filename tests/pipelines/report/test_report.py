@@ -83,11 +83,18 @@ def test_failures_are_counted_and_kept_out_of_medians(tiny):
         assert row.failed == row.n
 
 
+def test_poses_that_are_ambiguous_or_unreliable_are_counted_apart():
+    item = _series(4, 2, np.arange(4.0))
+    ambiguous, unreliable = (np.isin(np.arange(8), rows) for rows in ([1], [0, 1, 5]))
+    rows = cells([replace(item, ambiguous=ambiguous, unreliable=unreliable)], {0: "a", 1: "a", 2: "b", 3: "b"})
+    assert [(row.ambiguous, row.unreliable) for row in rows] == [(1, 2), (0, 1)]
+
+
 def _series(n, draws, values):
     errors = {column: np.repeat(values, draws) for column in ERRORS}
     frame = np.repeat(np.arange(n), draws)
     status, never = np.full(len(frame), "ok"), np.zeros(len(frame), bool)
-    return Series("x", {}, frame, errors, np.full((len(frame), 6), np.nan), status, never, never)
+    return Series("x", {}, frame, errors, np.full((len(frame), 6), np.nan), status, never, never, never)
 
 
 def test_draws_of_one_frame_stay_together_in_the_intervals():

@@ -41,7 +41,7 @@ def _scores(seed, key=("best", "detected", "exact", "all")):
     named = dict(zip(("solver", "point_source", "assumed_camera", "point_set"), key, strict=True))
     frame_id = np.array([frame["frame_id"] for frame in FRAMES])
     normalised = rng.standard_normal((n, 6))
-    return Series(" ".join(key), named, frame_id, errors, normalised, np.full(n, "ok", "U20"), *np.zeros((2, n), bool))
+    return Series(" ".join(key), named, frame_id, errors, normalised, np.full(n, "ok", "U20"), *np.zeros((3, n), bool))
 
 
 def _run(seed=0):
@@ -126,6 +126,12 @@ def _ambiguous(run):
     return replace(run, found=[replace(run.found[0], ambiguous=flags)])
 
 
+def _unreliable(run):
+    flags = np.zeros(len(run.found[0].status), bool)
+    flags[[1, 4, 6]] = True
+    return replace(run, found=[replace(run.found[0], unreliable=flags)])
+
+
 def _wrong_poses(run):
     return replace(run, found=[replace(run.found[0], normalised=1.6 * run.found[0].normalised)])
 
@@ -146,6 +152,7 @@ def _wrong_poses(run):
             ],
         ),
         (_ambiguous, ["best detected exact all says of 2 poses that the points allow another as well: frames "]),
+        (_unreliable, ["best detected exact all says of 3 poses that its covariance is unreliable: frames "]),
         (_wrong_poses, ["poses of best detected exact all are off by 1."]),
     ],
     ids=lambda item: item.__name__ if callable(item) else "",
@@ -160,7 +167,7 @@ def test_each_fault_deserves_attention(plant, told):
 
 def test_another_camera_than_the_true_one_may_be_off():
     run = _run()
-    nominal = _wrong_poses(replace(run, found=[_scores(0, ("eposit", "detected", "nominal", "four"))]))
+    nominal = _unreliable(_wrong_poses(replace(run, found=[_scores(0, ("eposit", "detected", "nominal", "four"))])))
     assert _summary(nominal).attention == ()
 
 

@@ -184,8 +184,9 @@ def test_what_the_solver_says_about_its_poses_is_kept_and_null_where_it_says_not
     assert (told["ambiguous"].to_pylist(), told["covariance_unreliable"].to_pylist()) == ([None], [None])
 
 
-def test_the_scores_keep_what_is_ambiguous(tiny):
+def test_the_scores_keep_what_is_ambiguous_or_unreliable(tiny):
     for path in (tiny[1] / "scores").glob("best-*"):
-        told = pq.read_table(path)["ambiguous"].to_pylist()
-        assert told == pq.read_table(tiny[1] / "estimates" / path.name)["ambiguous"].to_pylist()
-        assert None not in told
+        for name in ("ambiguous", "covariance_unreliable"):
+            told = pq.read_table(path)[name].to_pylist()
+            assert told == pq.read_table(tiny[1] / "estimates" / path.name)[name].to_pylist()
+            assert None not in told
