@@ -9,6 +9,7 @@ import numpy as np
 from eposit.arrays import Array, Mask
 from pipelines.detection.board_map import BoardMap, Hold
 from pipelines.detection.corner_scatter import leverage, scatter_about, scatter_of_neighbours
+from pipelines.detection.smooth_extension import smooth_extension
 
 LIMIT_PX = 0.5  # largest distance of a corner from the map through the others
 LIMIT_SHARE = 0.03  # or this share of the local square, whichever is more
@@ -16,6 +17,7 @@ LIMIT_SPREADS, MOST_SHARE = 4.0, 0.15  # or so many median distances, up to this
 SHARP_SPREADS, SHARP_PX = 12.0, 0.1  # but no more than so many median distances, nor less than this: beside what covers
 # a part of the board a corner may be half a pixel off where all others agree to a hundredth
 PLACED_PX = 0.1  # deviation of a corner that something else placed, until their scatter is known
+OWN_SPREADS = 6.0  # or than so many of its own, which is as much larger as its pixels tell less of it
 BAD_SHARE = 0.25  # of the corners that may be inconsistent before the board is, and one of few in any case
 
 
@@ -58,23 +60,57 @@ def _agreeing(corners: Corners, at: Array, size: tuple[int, int]) -> Corners:
     for _ in range(max(1, int(BAD_SHARE * len(points))) + 1):
         if 2 * np.sum(good) <= board.slopes(at).shape[-1]:
             return replace(corners, consistent=np.zeros(len(at), bool))
-        weights = _weights(corners.covariance_px2, good)
-        board = BoardMap.fit(at, points, size, weights, board, hold_of(corners.covariance_px2, good))
+        weights, board = _weights(corners.covariance_px2, good), _map_through(corners, good, board, at, size)
         distance, spread = _left_out(points, board, at, weights)
-        excess = np.where(good, distance / _limits(side, float(np.median(distance[good])) * spread, spread), 0.0)
+        typical = float(np.median(distance[good])) * spread
+        limits = _limits(side, typical, spread, _relative(corners.covariance_px2, good))
+        excess = np.where(good, distance / limits, 0.0)
         worst = int(np.argmax(excess))
         if excess[worst] <= 1.0:
+            back = _taken_back(corners, good, board, at, weights)
+            if np.any(back):
+                good |= back
+                board = _map_through(corners, good, board, at, size)
             break
         good[worst] = False
     return replace(corners, consistent=good, board=board)
 
 
-def _limits(side: Array, typical: Array, spread: Array) -> Array:
+def _map_through(corners: Corners, good: Mask, start: BoardMap, at: Array, size: tuple[int, int]) -> BoardMap:
+    """The map through the good corners, from one near by."""
+    weights, hold = _weights(corners.covariance_px2, good), hold_of(corners.covariance_px2, good)
+    return BoardMap.fit(at, corners.points_px, size, weights, start, hold)
+
+
+def _taken_back(corners: Corners, good: Mask, board: BoardMap, at: Array, weights: Array) -> Mask:
+    """(n,) which corners that were dropped agree after all with the map through the others, or an extension of it.
+
+    While such a corner took part, its distance from the map through the others was worked out as for small changes of
+    the map.
+    """
+    lost, back = np.flatnonzero(corners.consistent & ~good), np.zeros(len(good), bool)
+    if not len(lost):
+        return back
+    missed = corners.points_px - board(at)
+    usual = float(np.median(_left_out(corners.points_px, board, at, weights)[0][good]))
+    side = np.sqrt(np.abs(np.linalg.det(board.jacobian(at[lost]))))
+    relative, same = _relative(corners.covariance_px2, good)[lost], np.ones(len(lost))
+    back[lost] = np.linalg.norm(missed[lost], axis=1) <= _limits(side, usual * same, same, relative)
+    extended = smooth_extension(at[good], missed[good], at[lost], missed[lost], usual)
+    if extended is not None:
+        limits = _limits(side, extended.typical * extended.spread, same, relative)
+        back[lost] |= np.linalg.norm(extended.missed, axis=1) <= limits
+    return back
+
+
+def _limits(side: Array, typical: Array, spread: Array, relative: Array) -> Array:
     """(n,) largest distances from the map through the others, px.
 
     side: (n,) of the local squares, px. typical: (n,) median distance times `spread`, px. spread: see `_left_out`.
+    relative: (n,) deviation that is stated for each over the median one.
     """
-    usual = np.minimum(np.maximum(LIMIT_PX, LIMIT_SHARE * side), np.maximum(SHARP_SPREADS * typical, SHARP_PX * spread))
+    sharp = np.maximum(np.maximum(SHARP_SPREADS, OWN_SPREADS * relative) * typical, SHARP_PX * spread)
+    usual = np.minimum(np.maximum(LIMIT_PX, LIMIT_SHARE * side), sharp)
     return np.maximum(usual, np.minimum(LIMIT_SPREADS * typical, MOST_SHARE * side))
 
 
@@ -107,6 +143,12 @@ def _weights(covariance: Array, good: Mask) -> Array:
 def hold_of(covariance: Array, good: Mask) -> Hold:
     """How firmly corners with (n, 2, 2) covariances leave the lens of their map where it usually is."""
     return Hold(float(np.sqrt(0.5 * np.median(np.trace(covariance[good], axis1=1, axis2=2)))))
+
+
+def _relative(covariance: Array, good: Mask) -> Array:
+    """(n,) deviations over the median one of the good ones."""
+    deviation = np.sqrt(0.5 * np.trace(covariance, axis1=1, axis2=2))
+    return deviation / np.median(deviation[good])
 
 
 def _left_out(points: Array, board: BoardMap, at: Array, weights: Array) -> tuple[Array, Array]:

@@ -28,6 +28,11 @@ BLUR_LIMITS_PX = (0.2956, 8.0)  # no picture is sharper than its pixels' own are
 LEAST_NOISE = 0.04  # variance, grey levels^2: half of what rounding to whole grey levels leaves
 FURTHEST_STEP = (0.7, 0.7, 0.15, 0.15, 0.4)  # of the first numbers in one iteration; the others are linear
 LEAST_PIXELS = 24
+SPOILED_NOISES, LEAST_SPOILED = (
+    25.0,
+    20.0,
+)  # variances of the noise that a residual's square must exceed, and grey levels
+MOST_SPOILED = 20  # pixels of a corner that no model explains and that are left out: more of them are no single ones
 
 
 class CornerFits(NamedTuple):
@@ -117,6 +122,23 @@ def _noise(jacobian: Array, residual: Array, n: int) -> float:
 
 
 @inlined
+def _leave_out_spoiled(pixels: CornerPixels, n: int, noise: float) -> int:
+    """Number of pixels that are left: the one farthest from the model is taken out if no noise explains it.
+
+    A pixel that is white or black whatever falls on it may lie, upon an edge, between its neighbours' values.
+    """
+    worst = 0
+    for i in range(n):
+        if abs(pixels.residual[i]) > abs(pixels.residual[worst]):
+            worst = i
+    square = pixels.residual[worst] ** 2
+    if n <= LEAST_PIXELS or square <= SPOILED_NOISES * noise or square <= LEAST_SPOILED * LEAST_SPOILED:
+        return n
+    pixels.x[worst], pixels.y[worst], pixels.grey[worst] = pixels.x[n - 1], pixels.y[n - 1], pixels.grey[n - 1]
+    return n - 1
+
+
+@inlined
 def _begin(start: Array, trial: Array, p: Array) -> bool:
     """Both shapes are `start`; True where it has no levels: then they are those of the saddle alone, on no mean."""
     for k in range(SHAPE):
@@ -188,7 +210,7 @@ def _fit_all(
         if n < LEAST_PIXELS:
             continue
         p = fitted[i]
-        cost, damping, noise, settled = -1.0, 1e-4, 0.0, False
+        cost, damping, noise, settled, least = -1.0, 1e-4, 0.0, False, n - MOST_SPOILED
         for count in range(-1 if _begin(shapes[i], trial, p) else 0, steps):
             draw(trial, n, edges[i], sharp[i], pixels)  # the one place: each copy takes seconds to compile
             if count < 0:
@@ -209,6 +231,10 @@ def _fit_all(
                 break
             if settled or _move(p, step, right, trial) <= stop * stop * noise:
                 _copy(trial, p)
+                left = _leave_out_spoiled(pixels, n, noise) if n > least else n
+                if left < n:
+                    n, cost, damping, settled = left, -1.0, 1e-4, False
+                    continue
                 converged[i] = True
                 break
         converged[i] = _invert(system, covariances[i]) and converged[i]

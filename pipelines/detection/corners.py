@@ -16,6 +16,7 @@ from pipelines.detection.corner_blur import measured_blur, widths_beyond
 from pipelines.detection.corner_model import fit_corners
 from pipelines.detection.corner_picture import BLUR, CONTRAST, MEAN, SHAPE, SLOPE, CornerTask
 from pipelines.detection.corner_sites import CornerSites
+from pipelines.detection.edge_form_errors import FORM_SHARE, form_errors
 from pipelines.detection.finders import Grey
 from pipelines.detection.hot_pixels import without_hot_pixels
 from pipelines.detection.time_limit import Check, unlimited
@@ -36,7 +37,6 @@ MOST_LOST = 0.5  # of the corners
 LEAST_CONTRAST = 0.2  # of the board's: a corner in a shadow has it, a covered one has not
 FEW = 24  # corners that hardly tell a map's parameters: they are fitted again from the better map
 MISFIT_NOISE = 4.0  # mean squares of a corner's uncertainty that its distance from a good map may have
-FORM_SHARE = 0.4  # of the map's misfit, a square's length along an edge, by which a wrong form moves a corner
 
 
 class _Pass(NamedTuple):
@@ -68,7 +68,7 @@ def refine_corners(
     image = without_hot_pixels(image, board(at), float(np.abs(board.jacobian(at)).max()))
     light = decoded(image, 1.0)
     corners, shapes = _fit(light, board, sites, _start_shapes(board, at, measured_blur(light, board, sites)), NEAR)
-    exponent = 0.0
+    exponent, limits = 0.0, NEAR
     for _ in range(2 if len(at) < FEW else 1):
         check_time()
         good = corners.consistent
@@ -87,6 +87,9 @@ def refine_corners(
         corners = replace(corners, board=_next_map(corners, corners.board, at, size))
         beyond = widths_beyond(light, corners.board, sites, corners.blur_px)
         corners = replace(corners, widths_beyond_px=(float(beyond[0]), float(beyond[1])))
+        if len(at) < FEW:
+            added = form_errors(corners, at, min(sites.reach, limits.reach))
+            corners = replace(corners, covariance_px2=corners.covariance_px2 + added)
         sites, corners = _with_nearby(light, sites, unseen, corners)
     return drop_inconsistent(corners, sites.at, size)
 
