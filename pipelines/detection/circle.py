@@ -18,11 +18,12 @@ from scipy.optimize import minimize_scalar
 
 from eposit.arrays import Array
 from pipelines.detection.board_map import BoardMap, grid
+from pipelines.detection.circle_doubt import USUALLY_BEYOND_PX, at_least, beyond_the_fit, unexplained_size
 from pipelines.detection.circle_light import MANY_CELLS, MUCH_CLIPPED, fit_in_any_light
 from pipelines.detection.circle_model import ROUNDING, cost_of, fit_disc
 from pipelines.detection.circle_numbers import DISC_GREY, SHAPE, SIZE, WHITE_GREY, DiscFit, Patch, Prior
 from pipelines.detection.circle_patch import Picture, circle_patch
-from pipelines.detection.circle_prior import known_beforehand
+from pipelines.detection.circle_prior import MISFIT_SLOPES, known_beforehand
 from pipelines.detection.consistency import Corners
 from pipelines.detection.corner_blur import LIMITS_PX, SAMPLING
 from render.targets.chessboard import Chessboard
@@ -37,20 +38,15 @@ CORNER_PX = 0.01  # an ordinary corner's uncertainty, of which that of the map f
 # How far a lens may lie from one with square pixels, its centre in the picture's, and equidistance, if nothing is known
 # of it; see `generic_lens`. Where the map's lies farther from it, the true one may, too: so many times as far.
 LENS_SPREAD, FARTHER = np.array([0.02, 100.0, 100.0, 0.3, 0.3, 0.3]), 3.0
+STEP = 1e-3 * np.eye(2)  # squares: for slopes along the board
 SURE_SHARE = 0.01  # of a square: a prediction less sure than this has the circle looked for around it
 LOOKS = (5, 9)  # places along both axes of the ellipse in which a circle is looked for
 FEWER_LOOKS = (3, 7)  # likewise a large one
 LOOK_SPREADS = 10.0  # half its axes, in deviations of the prediction: it is far from linear
 GOOD_SHARE = 1.2  # of the residuals of the best fit in the ellipse, up to which a fit from the prediction is kept
 FAR_SPREADS = 3.0  # of the prediction that a circle may lie off, for each that a linear map allows
-OFF_SHARE = 0.02  # of how far it lies off: a map that is wrong there has the circle's form a little wrong, too
-MISFIT_SHARE = 0.1  # of the map's misfit, by which a bent sheet moves it
-CORNERS_SHARE = 0.25  # of the corners' stated error that a circle has at least: what moves them moves it
-USUALLY_BEYOND_PX = 0.1  # by which edges differ from those of a gaussian blur in ordinary pictures, defocus included
-PRINT_BEYOND_PX = 0.025  # from which on it is print that runs
-BEYOND_SHARE, APART_SHARE = 0.09, 0.3  # of what they differ by more, and along one axis more than along the other, by
-# which a circle may be off: its shade looks like what sharpening and motion leave beside an edge
-USUALLY_LEFT, MOST_LEFT = 1.3, 30.0  # times the corners' noise that a fit leaves: no model of a disc explains more
+PRINT_BEYOND_PX = 0.025  # by which edges are narrower than those of a gaussian blur where it is print that runs
+USUALLY_LEFT, MOST_LEFT = 1.2, 30.0  # times the corners' noise that a fit leaves: no model of a disc explains more
 SIZE_LIMIT = 0.03  # of the size
 LARGE_RADIUS_PX = 30.0  # a larger circle is read in means of pixels that leave its edges this blur:
 LEAST_BLUR_PX = 0.7  # below it the fine grid would sample them badly
@@ -102,7 +98,7 @@ class _Place:
     corners: Corners
     target: Chessboard
     misfit: float
-    unsure: Array  # (2, 2) covariance of the place, squares^2
+    unsure: Array  # (3, 3) covariance of place, squares, and size, as a share, before the circle is looked at
 
     @property
     def radius(self) -> float:
@@ -130,19 +126,13 @@ class _Place:
         dark = fit.values[WHITE_GREY] - fit.values[DISC_GREY] > LEAST_CONTRAST * self.corners.contrast
         if not dark or not _is_near(shift * self.radius, self.unsure):
             return None
-        covariance = to_px @ fit.covariance[:2, :2] @ to_px.T * max(1.0, left / USUALLY_LEFT) ** 2
-        return Circle(centre + to_px @ shift, covariance + self._doubt(to_px @ shift))
-
-    def _doubt(self, off: Array) -> Array:
-        """(2, 2) px^2, beyond that of the fit, of a circle that lies so far (2,) px off its prediction."""
+        covariance = to_px @ fit.covariance[:2, :2] @ to_px.T * max(1.0, left / USUALLY_LEFT)
+        radius_px, size = math.sqrt(abs(np.linalg.det(to_px))), fit.values[SIZE] - 1.0
         corners = np.median(self.corners.covariance_px2[self.corners.consistent], axis=0)
-        along_x, along_y = self._beyond
-        beyond = max(abs(along_x), abs(along_y), USUALLY_BEYOND_PX) - USUALLY_BEYOND_PX
-        apart = max(abs(along_x - along_y), USUALLY_BEYOND_PX) - USUALLY_BEYOND_PX
-        misfit = self.misfit * math.sqrt(abs(np.linalg.det(self.seen[1]))) / self.radius
-        variance = OFF_SHARE**2 * (off @ off) + (BEYOND_SHARE * beyond) ** 2 + (APART_SHARE * apart) ** 2
-        variance += (MISFIT_SHARE * misfit) ** 2
-        return variance * np.eye(2) + CORNERS_SHARE**2 * corners
+        covariance += beyond_the_fit(to_px @ shift, corners, self._beyond, self.misfit * radius_px / self.radius)
+        sure = math.hypot(math.sqrt(self.unsure[2, 2]), MISFIT_SLOPES * self.misfit)
+        odd = unexplained_size(size, sure, max(map(abs, self._beyond)) / radius_px)
+        return Circle(centre + to_px @ shift, at_least(covariance, odd * (to_px @ fit.with_size)))
 
     def _best_fit(self) -> DiscFit | None:
         """Of the circle where the board puts it and, if the place is unsure, of one that is looked for around it."""
@@ -159,9 +149,13 @@ class _Place:
         far = self._fit(around, replace(known, start=_best_start(around, known, self.unsure, self.radius)))
         if near is None:
             return far
+        if not near.converged:
+            return far
         left, best = (cost_of(around, known, fit.values[:SHAPE]) for fit in (near, far))
         good = GOOD_SHARE * best + ROUNDING * len(around.grey)
-        return _unless_apart(near, far) if left <= good else far
+        if left > good:
+            return far
+        return _unless_apart(near, far) if far.converged else near
 
     def _patch(self, blur_px: float, doubt: float = 0.0) -> Patch | None:
         return circle_patch(self.image, self.corners.board, self.seen, blur_px, self.target, doubt)
@@ -229,9 +223,10 @@ def misfit_squares(corners: Corners, at: Array) -> float:
 
 
 def _unsure(board: BoardMap, target: Chessboard, shape: tuple[int, int]) -> Array:
-    """(2, 2) covariance, squares^2, of how far the circle's height displaces it, as one view of the corners tells it.
+    """(3, 3) covariance of how far the circle's height displaces it, squares, and of its size there, as a share.
 
-    Whether a lens is longer along x than along y looks much like a tilt. shape: height and width of the picture, px.
+    It is what one view of the corners tells. Whether a lens is longer along x than along y looks much like a tilt.
+    shape: height and width of the picture, px.
     """
     at, height = target.circle_centre[None, :2] / target.square_mm, target.circle_height_mm / target.square_mm
     slopes = board.slopes(grid(target.inner)).reshape(2 * target.circle_index, -1) / CORNER_PX
@@ -240,7 +235,9 @@ def _unsure(board: BoardMap, target: Chessboard, shape: tuple[int, int]) -> Arra
     slopes = np.vstack((slopes, np.diag(np.append(np.zeros(7), 1.0 / spread))))
     displaced = (board.slopes(at, height) - board.slopes(at))[0]
     size = np.maximum(np.linalg.norm(slopes, axis=0), 1e-12)
-    change = np.linalg.inv(board.jacobian(at[0])) @ displaced / size
+    along_x, along_y = ((board.slopes(at + step, height) - board.slopes(at - step, height))[0] for step in STEP)
+    larger = np.einsum("ij,jik->k", np.linalg.inv(board.jacobian(at[0], height)), np.stack((along_x, along_y), axis=1))
+    change = np.vstack((np.linalg.inv(board.jacobian(at[0])) @ displaced, larger / (4.0 * STEP[0, 0]))) / size
     _, told, axes = np.linalg.svd(slopes / size, full_matrices=False)
     along = change @ axes.T / np.maximum(told, 1e-13 * told[0])
     return along @ along.T
@@ -248,17 +245,17 @@ def _unsure(board: BoardMap, target: Chessboard, shape: tuple[int, int]) -> Arra
 
 def _looked_for(unsure: Array) -> float:
     """Squares around the prediction in which the circle is looked for; 0 where the prediction is sure."""
-    spread = math.sqrt(np.linalg.eigvalsh(unsure)[-1])
+    spread = math.sqrt(np.linalg.eigvalsh(unsure[:2, :2])[-1])
     return min(LOOK_SPREADS * spread, FARTHEST_SHARE) if spread > SURE_SHARE else 0.0
 
 
 def _best_start(patch: Patch, known: Prior, unsure: Array, radius: float) -> Array:
     """The best start on a grid over the ellipse in which the prediction is unsure.
 
-    unsure: (2, 2) covariance of the prediction, squares^2. radius: of the circle, squares.
+    unsure: covariance of the prediction, see `_unsure`. radius: of the circle, squares.
     """
     looks = LOOKS if patch.blocked.size <= MANY_CELLS else FEWER_LOOKS
-    variances, axes = np.linalg.eigh(unsure)
+    variances, axes = np.linalg.eigh(unsure[:2, :2])
     reach = np.minimum(LOOK_SPREADS * np.sqrt(np.maximum(variances, 0.0)), FARTHEST_SHARE) / radius
     minor, major = (np.linspace(-far, far, count) for far, count in zip(reach, looks, strict=True))
     starts = [
@@ -269,5 +266,5 @@ def _best_start(patch: Patch, known: Prior, unsure: Array, radius: float) -> Arr
 
 def _is_near(shift: Array, unsure: Array) -> bool:
     """Whether a circle that lies so many squares from its prediction is this board's."""
-    allowed = FAR_SPREADS**2 * unsure + (SEARCH_SHARE / 3.0) ** 2 * np.eye(2)
+    allowed = FAR_SPREADS**2 * unsure[:2, :2] + (SEARCH_SHARE / 3.0) ** 2 * np.eye(2)
     return bool(shift @ np.linalg.solve(allowed, shift) < 9.0 and np.linalg.norm(shift) < FARTHEST_SHARE)

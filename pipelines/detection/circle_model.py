@@ -28,6 +28,7 @@ from pipelines.detection.circle_numbers import (
     OBLONG,
     SHADOW,
     SHAPE,
+    SIZE,
     SOFTNESS,
     WHITE_GREY,
     WHITE_SLOPE,
@@ -163,16 +164,17 @@ def fit_disc(patch: Patch, prior: Prior) -> DiscFit:
         if right @ step <= STOP * STOP * noise:
             values[:SHAPE] += step[:SHAPE]
             covariance = np.linalg.inv(normal) * noise
-            factor = _unexplained(patch, jacobian, best, covariance)
+            factor, with_size = _unexplained(patch, jacobian, best, covariance), _with_size(covariance)
             moved = _rim_doubt(patch, values, np.linalg.solve(normal, jacobian.T))
             covariance = covariance * factor + np.outer(moved, moved)
             oblong = _gain_of_form(normal, right, weigh, values - prior.mean) / noise
-            return DiscFit(values, covariance, True, float(best @ best / len(best)), factor, oblong)
+            return DiscFit(values, covariance, True, float(best @ best / len(best)), factor, with_size, oblong)
         trial = values.copy()
         trial[:SHAPE] += np.clip(step[:SHAPE], -FURTHEST_STEP, FURTHEST_STEP)
         trial[SHADOW] = np.clip(trial[SHADOW], -prior.furthest_shadow, prior.furthest_shadow)
         trial[SOFTNESS] = np.clip(trial[SOFTNESS], *SOFTNESS_LIMITS)
-    return DiscFit(values, np.linalg.inv(normal) * noise, False, float(best @ best / len(best)), 1.0, 0.0)
+    covariance = np.linalg.inv(normal) * noise
+    return DiscFit(values, covariance, False, float(best @ best / len(best)), 1.0, _with_size(covariance), 0.0)
 
 
 def shadow_of(on_board: Array, place: tuple[float, float], softness: float) -> Array:
@@ -243,6 +245,11 @@ def _unexplained(patch: Patch, jacobian: Array, residual: Array, covariance: Arr
     noise = _noise(jacobian, residual)
     scatter = np.trace(np.linalg.solve(covariance[:2, :2], moved.T @ moved)) / (2.0 * noise**2)
     return max(1.0, float(scatter) / USUAL_SCATTER)
+
+
+def _with_size(covariance: Array) -> Array:
+    """(2,) radii by which the place moves with the size, for a change of it by 1."""
+    return covariance[:2, SIZE] / covariance[SIZE, SIZE]
 
 
 def _gain_of_form(normal: Array, right: Array, weigh: Array, off: Array) -> float:

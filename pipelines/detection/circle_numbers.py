@@ -56,4 +56,5 @@ class DiscFit:
     converged: bool
     residual: float  # mean square, grey values^2
     unexplained: float  # factor of the covariance for what the model leaves out; 1 where it explains the picture
+    with_size: Array  # (2,) radii by which the place moves with the size, for a change of it by 1
     oblong: float  # by how many variances the sum of squares would be less if nothing were known of its form

@@ -1,0 +1,113 @@
+"""What a circle's stated error holds beyond that of its fit."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from pipelines.detection import circle
+from pipelines.detection.board_map import BoardMap, grid
+from pipelines.detection.circle import CORNER_PX, FARTHER, LENS_SPREAD, _unsure, find_circle
+from pipelines.detection.circle_doubt import RESIZED, at_least, beyond_the_fit, unexplained_size
+from pipelines.detection.circle_light import fit_in_any_light
+from pipelines.detection.consistency import Corners
+from tests.pipelines.detection import test_circle as drawing
+from tests.supersampled import digitised
+
+COVARIANCE = np.array([[4e-4, 1e-4], [1e-4, 9e-4]])  # px^2
+SURE = np.eye(2) * 1e-6  # px^2, of a corner
+
+
+def along(covariance, way):
+    way = way / np.linalg.norm(way)
+    return float(way @ covariance @ way)
+
+
+def test_the_error_is_no_smaller_than_the_way_to_the_maps_size():
+    resized = np.array([0.03, -0.04])
+    widened = at_least(COVARIANCE, resized)
+    assert math.isclose(along(widened, resized), (RESIZED * 0.05) ** 2)
+    aside = np.array([0.04, 0.03])
+    assert math.isclose(along(widened, aside), along(COVARIANCE, aside))
+
+
+@pytest.mark.parametrize("resized", [np.zeros(2), np.array([0.003, -0.004])])
+def test_an_error_that_holds_it_already_stays(resized):
+    assert np.allclose(at_least(COVARIANCE, resized), COVARIANCE, rtol=1e-12, atol=0.0)
+
+
+def test_a_size_that_the_map_or_sharpening_explains_says_nothing():
+    assert unexplained_size(0.0004, 0.0, 0.0) == 0.0
+    assert unexplained_size(-0.004, 0.01, 0.0) == 0.0
+    assert unexplained_size(-0.004, 0.0, 0.03) == 0.0
+    assert math.isclose(unexplained_size(-0.004, 0.0, 0.0), 0.0035)
+
+
+def test_noise_in_the_edges_widths_is_not_taken_for_sharpening():
+    """In a faint picture corners are unsure by 0.05 px and edges' widths by 0.2; beside sure corners this tells."""
+    quiet, none = np.zeros(2), (0.0, 0.0)
+    faint, seen = np.eye(2) * 0.05**2, (0.05, -0.2)
+    assert np.allclose(beyond_the_fit(quiet, faint, seen, 0.0), beyond_the_fit(quiet, faint, none, 0.0))
+    assert beyond_the_fit(quiet, SURE, seen, 0.0)[0, 0] > 4.0 * beyond_the_fit(quiet, SURE, none, 0.0)[0, 0]
+
+
+def changed(board, which, by):
+    """The map with one number of its pose or lens changed."""
+    turn, t, lens = np.zeros(3), board.t.copy(), board.lens.copy()
+    (turn, t, lens)[min(which // 3, 2)][which if which < 3 else which - 3 if which < 6 else which - 6] += by
+    return BoardMap(board.R @ Rotation.from_rotvec(turn).as_matrix(), t, lens)
+
+
+@pytest.mark.parametrize("name", drawing.VIEWS)
+def test_how_sure_the_map_is_of_a_circles_size_is_what_all_maps_like_it_say(name):
+    """The covariance of all numbers of the map, whose slopes are differences here, carried to the size."""
+    at, size = grid(drawing.TARGET.inner), (drawing.WIDTH, drawing.TALL)
+    seen = drawing.project(drawing.view(name), at, 0.0)
+    board = BoardMap.fit(at, seen, size, np.ones(len(seen)))
+    steps = np.concatenate((np.full(6, 1e-5), 1e-5 * np.array([board.lens[0], 1.0, *size, 1.0, 1.0, 1.0])))
+
+    def log_size(board):
+        return 0.5 * math.log(abs(np.linalg.det(board.jacobian(drawing.AT, drawing.HEIGHT))))
+
+    slopes, growth = np.empty((2 * len(at), 13)), np.empty(13)
+    for which, step in enumerate(steps):
+        more, less = (changed(board, which, sign * step) for sign in (1.0, -1.0))
+        slopes[:, which] = (more(at) - less(at)).ravel() / (2.0 * step * CORNER_PX)
+        growth[which] = (log_size(more) - log_size(less)) / (2.0 * step)
+    usual = np.array([0.0, (size[0] - 1) / 2.0, (size[1] - 1) / 2.0, 0.0, 0.0, 0.0])
+    spread = np.maximum(LENS_SPREAD, FARTHER * np.abs(board.lens[1:] - usual))
+    known = np.diag(np.append(np.zeros(7), 1.0 / spread))
+    expected = math.sqrt(growth @ np.linalg.inv(slopes.T @ slopes + known.T @ known) @ growth)
+    assert abs(math.sqrt(_unsure(board, drawing.TARGET, size[::-1])[2, 2]) / expected - 1.0) < 0.02  # by differences
+
+
+@pytest.mark.full
+def test_a_fit_that_did_not_converge_gives_way_to_one_that_did(monkeypatch):
+    """Where the place is unsure, the circle is fitted from the prediction and from the best place around it."""
+    image, camera = drawing.board_with("far")
+    corners = drawing.project(camera, grid(drawing.TARGET.inner), 0.0)
+    board = BoardMap.fit(grid(drawing.TARGET.inner), corners, image.shape[::-1], np.ones(len(corners)))
+    told = Corners(
+        corners,
+        np.zeros((len(corners), 2, 2)),
+        np.ones(len(corners), bool),
+        drawing.EDGE_BLUR,
+        drawing.WHITE - drawing.BLACK,
+        board,
+    )
+    monkeypatch.setattr(circle, "SURE_SHARE", 0.0)
+    picture = digitised(image, np.random.default_rng(0), 1.0)
+    expected = find_circle(picture, told, drawing.TARGET)
+    for lost in (0, 1):
+        fits = []
+
+        def one_fails(*args, lost=lost, fits=fits):
+            fits.append(fit_in_any_light(*args))
+            return replace(fits[-1], converged=len(fits) - 1 != lost)
+
+        monkeypatch.setattr(circle, "fit_in_any_light", one_fails)
+        found = find_circle(picture, told, drawing.TARGET)
+        assert len(fits) == 2
+        assert np.linalg.norm(found.centre_px - expected.centre_px) < 0.01  # noise moves it by as much
