@@ -147,7 +147,12 @@ Timeout = Annotated[
     float, typer.Option(metavar="SECONDS", help="Time that a function of yours may take for one image.")
 ]
 MemoryMb = Annotated[
-    int, typer.Option(metavar="MB", help="Memory that the process of a function of yours may take; on Linux.")
+    int,
+    typer.Option(
+        metavar="MB",
+        envvar="EPOSIT_MEMORY_MB",
+        help="Memory that the process of a function of yours may take; on Linux.",
+    ),
 ]
 PointsName = Annotated[str, typer.Option("--points", help="detected, truth or truth+noise.")]
 CameraName = Annotated[str, typer.Option("--camera", help="Camera that is assumed: exact, nominal or paper.")]

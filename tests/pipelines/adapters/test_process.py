@@ -157,6 +157,20 @@ def test_a_function_that_takes_too_much_memory_is_a_status(name):
 
 
 @pytest.mark.full
+@pytest.mark.skipif(sys.platform != "linux", reason="the limit is Linux's")
+def test_the_memory_of_a_function_is_an_option_or_a_variable(root, cli, tmp_path, monkeypatch):
+    text = "def solve(a, b, camera):\n    bytearray(3 * 10**8)\n    return None\n"
+    name = f"{own_module(tmp_path, monkeypatch, text)}:solve"
+    done = cli("estimate", root, "--solver", name, "--overwrite", "-q")
+    assert (done.code, done.err) == (0, "")
+    monkeypatch.setenv("EPOSIT_MEMORY_MB", "200")
+    done = cli("estimate", root, "--solver", name, "--overwrite", "-q")
+    assert "frame 0: ran out of memory, of which --memory-mb allows 200 MB" in done.err
+    done = cli("estimate", root, "--solver", name, "--overwrite", "--memory-mb", 400, "-q")
+    assert (done.code, done.err) == (0, "")
+
+
+@pytest.mark.full
 def test_a_function_that_hangs_in_a_dataset(root, cli, tmp_path, monkeypatch):
     module = own_module(tmp_path, monkeypatch, "import time\ndef solve(a, b, camera):\n    time.sleep(600)\n")
     done = cli("estimate", root, "--solver", f"{module}:solve", "--timeout", "5", "-q")

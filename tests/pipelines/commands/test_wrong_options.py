@@ -7,6 +7,10 @@ import pytest
 from tests.wrong_input import assert_refused, estimate, on_dataset
 
 CASES = {
+    "too little memory": (
+        estimate("--solver", "mine:solve", "--memory-mb", 5),
+        "--memory-mb 5: give MB from 100 to 10000000, as 1500",
+    ),
     "missing recipe": (lambda place: ("run", place.folder / "no.toml", "--out", place.new()), "cannot read recipe"),
     "recipe is a folder": (lambda place: ("run", f"{place.folder}/", "--out", place.new()), "Is a directory"),
     "dataset with a long name": (lambda place: ("frame", "x" * 300, 0), "its name is longer than"),
