@@ -30,6 +30,11 @@ class Hold(NamedTuple):
     centre: float = 0.2  # likewise, shares of the picture's longer side
     bend: float = 0.4  # likewise, of each of k1, k2, k3
 
+    def spread(self, size: tuple[int, int]) -> Array:
+        """(6,) spread of a lens about the usual one, but of its focal length, which may be any. size: px."""
+        centre = self.centre * max(size)
+        return np.array([self.aspect, centre, centre, self.bend, self.bend, self.bend])
+
 
 GOOD_CORNERS = Hold()
 SEEN_CORNERS = Hold(1.0, 0.03, 0.15, 0.3)  # by a finder, some a few pixels off: they would bend a lens at will
@@ -184,11 +189,9 @@ def normal_angles(jacobian: Array) -> Array:
 
 def _held(size: tuple[int, int], weights: Array, hold: Hold) -> Array:
     """(2, 7) a usual lens and the weights that keep a lens near it; see `generic_lens.fit`."""
-    centre = hold.centre * max(size)
-    spread = np.array([hold.aspect, centre, centre, hold.bend, hold.bend, hold.bend])
     held = np.zeros((2, generic_lens.LENS))
     held[0, 2:4] = (np.array(size) - 1.0) / 2.0
-    held[1, 1:] = hold.deviation_px**2 * np.median(weights[weights > 0.0]) / spread**2
+    held[1, 1:] = hold.deviation_px**2 * np.median(weights[weights > 0.0]) / hold.spread(size) ** 2
     return held
 
 

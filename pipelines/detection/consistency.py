@@ -77,9 +77,13 @@ def _agreeing(corners: Corners, at: Array, size: tuple[int, int]) -> Corners:
 
 
 def _map_through(corners: Corners, good: Mask, start: BoardMap, at: Array, size: tuple[int, int]) -> BoardMap:
-    """The map through the good corners, from one near by."""
-    weights, hold = _weights(corners.covariance_px2, good), hold_of(corners.covariance_px2, good)
-    return BoardMap.fit(at, corners.points_px, size, weights, start, hold)
+    """The map through the good corners, from one near by.
+
+    Where it does not follow the board, its lens may bend only as far as what it misses tells.
+    """
+    missed = np.sqrt(0.5 * np.median(np.sum((corners.points_px - start(at))[good] ** 2, axis=1)))
+    hold = Hold(max(hold_of(corners.covariance_px2, good).deviation_px, float(missed)))
+    return BoardMap.fit(at, corners.points_px, size, _weights(corners.covariance_px2, good), start, hold)
 
 
 def _taken_back(corners: Corners, good: Mask, board: BoardMap, at: Array, weights: Array) -> Mask:

@@ -88,7 +88,7 @@ def refine_corners(
         beyond = widths_beyond(light, corners.board, sites, corners.blur_px)
         corners = replace(corners, widths_beyond_px=(float(beyond[0]), float(beyond[1])))
         if len(at) < FEW:
-            added = form_errors(corners, at, min(sites.reach, limits.reach))
+            added = form_errors(corners, at, min(sites.reach, limits.reach), size)
             corners = replace(corners, covariance_px2=corners.covariance_px2 + added)
         sites, corners = _with_nearby(light, sites, unseen, corners)
     return drop_inconsistent(corners, sites.at, size)

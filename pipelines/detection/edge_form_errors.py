@@ -9,23 +9,23 @@ from __future__ import annotations
 import numpy as np
 
 from eposit.arrays import Array
-from pipelines.detection.board_map import FREE, HOLD_SHARE
+from pipelines.detection.board_map import Hold
 from pipelines.detection.consistency import Corners
 
 FORM_SHARE = 0.4  # of the error of an edge's form, a square's length along it, by which it moves a corner
 
 
-def form_errors(corners: Corners, at: Array, reach: float) -> Array:
+def form_errors(corners: Corners, at: Array, reach: float, size: tuple[int, int]) -> Array:
     """(n, 2, 2) covariances, px^2, of what the map's uncertain edges move the corners by.
 
     The map is taken to be uncertain as its fit to the consistent corners has it. at: (n, 2) squares. reach: squares
-    along the edges that the corners' fits use.
+    along the edges that the corners' fits use. size: width and height of the picture, px.
     """
     board, good = corners.board, corners.consistent
     whitener = np.linalg.cholesky(np.linalg.inv(corners.covariance_px2[good])).transpose(0, 2, 1)
     rows = (whitener @ board.slopes(at[good])).reshape(2 * int(np.sum(good)), -1)
-    variance = np.median(np.trace(corners.covariance_px2[good], axis1=1, axis2=2)) / 2.0
-    held = np.sqrt(HOLD_SHARE / variance) * np.eye(rows.shape[1])[-len(FREE) + 1 :] / FREE[1:, None]
+    spread = Hold().spread(size)
+    held = np.eye(rows.shape[1])[-len(spread) :] / spread[:, None]
     parameters = np.linalg.pinv(np.vstack((rows, held)))  # (p, m); times its transpose: the map's covariance
     added, jacobian = np.zeros((len(at), 2, 2)), board.jacobian(at)
     for k in range(2):
