@@ -36,9 +36,14 @@ LEAST_TYPICAL = 0.8  # median likeness of a board's points; noise that happens t
 FARTHEST_OFF = 0.15  # sides from the map through all points: a point farther off is none of the board's
 MOST_ROUGH = 0.08  # sides: root mean square distance of a board's points from the map through them; noise has more
 FIRM = 0.85  # of the lattice's median likeness: a point that looks less like a corner does not tell the lattice's size
-FIRM_CONTRAST = 0.5  # of its median contrast, likewise
+FIRM_CONTRAST = 0.25  # of its median contrast, likewise
 ENOUGH_PX = 16.0  # px of a level to a square: more show no more corners
 TOLD = (PointStatus.OK, PointStatus.MIRRORED)  # what is said where the picture tells which corner is which
+CHANCE_SHARE, CHANCE_LIKENESS = (
+    0.6,
+    0.95,
+)  # of a line's places, and of the median likeness: less, beside a full line, is
+# is what the edges of other things happen to make where a board without a margin ends
 FARTHEST_GAP = 8  # columns and rows over which a lattice is looked for beyond what hides it
 
 
@@ -106,6 +111,8 @@ def _told(level: LevelOf, smoothed: Level, grid: Grid, target: AnyChessboard) ->
     firm = _firm_part(smoothed, grid)
     if not _is_whole(firm, target):
         firm = _firm_part(smoothed, _bridged(level, smoothed, firm, target))
+    if _is_too_large(firm, target):
+        firm = _without_chance_lines(smoothed, firm)
     count = int(np.sum(firm.known))
     if count < LEAST_POINTS:
         return None
@@ -125,14 +132,32 @@ def _told(level: LevelOf, smoothed: Level, grid: Grid, target: AnyChessboard) ->
 
 def _placed(level: LevelOf, grid: Grid, board: BoardMap, target: AnyChessboard) -> Placement | PointStatus:
     """Where on the board the lattice lies. One that is larger is not looked at: its squares may be thousands."""
-    rows, columns = grid.points.shape[:2]
-    if any(own > most for own, most in zip(sorted((columns, rows)), sorted(target.inner), strict=True)):
+    if _is_too_large(grid, target):
         return PointStatus.OTHER_BOARD
+    rows, columns = grid.points.shape[:2]
     radius = target.circle_radius_mm / target.square_mm if isinstance(target, Chessboard) else None
     margin = target.margin_squares if isinstance(target, Chessboard) else target.margin_mm / target.square_mm
     look = look_at_squares(level.grey, board, grid, radius, margin)
     middle = (np.array([columns, rows]) - 1.0) / 2.0
     return identify((columns, rows), grid.white_first, look, target, board.jacobian(middle))
+
+
+def _is_too_large(grid: Grid, target: AnyChessboard) -> bool:
+    """Whether the lattice has more columns or rows than the board."""
+    return any(own > most for own, most in zip(sorted(grid.points.shape[:2]), sorted(target.inner), strict=True))
+
+
+def _without_chance_lines(smoothed: Level, grid: Grid) -> Grid:
+    """The lattice without outermost lines that few points make, each less like a corner, beside a line that is full."""
+    like, points = looks(smoothed, grid)[0], grid.points.copy()
+    typical = median_of_known(like)
+    for own, beside in ((0, 1), (-1, -2)):
+        for axis in (0, 1):
+            line = np.take(like, own, axis)
+            is_sparse = np.mean(np.isfinite(line)) <= CHANCE_SHARE and np.all(np.take(grid.known, beside, axis))
+            if is_sparse and median_of_known(line) < CHANCE_LIKENESS * typical:
+                points[(slice(None),) * axis + (own,)] = np.nan
+    return grid.with_points(points).cropped()
 
 
 def _firm_part(smoothed: Level, grid: Grid) -> Grid:

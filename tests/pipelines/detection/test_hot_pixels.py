@@ -54,7 +54,7 @@ def test_pixels_upon_edges_move_no_corner():
         for x, y in np.rint(np.concatenate([board(CORNERS + step) for step in along * np.eye(2)])).astype(int):
             spoiled[y, x] = 0
     found = refine_corners(spoiled, board, chessboard_sites(TARGET))
-    # While they take part, corners are 0.2 px off and states as much, or are refused.
+    # While they take part, corners are 0.03 px off.
     assert found.consistent.all()
     assert np.sqrt(np.mean((found.points_px - truth) ** 2)) < 0.006  # as in a picture without any
     ratio = np.median(found.covariance_px2[:, 0, 0] / before.covariance_px2[:, 0, 0])
