@@ -18,7 +18,7 @@ BEYOND_SHARE, APART_SHARE = 0.09, 0.3  # of what they differ by more, and along 
 USUAL_SIZE = 0.0005  # by which a fit that explains the picture finds another size than the map's
 SURE_SIZE = 0.5  # deviations of the map's size that also say nothing
 SHARPENED_SHARE = 0.15  # of what edges are narrower or wider, by which sharpening shifts a rim all around
-RESIZED = 1.7  # times as far as the fit would move at the map's size, what made the size wrong may move the place
+RESIZED = 1.8  # times as far as the fit would move at the map's size, what made the size wrong may move the place
 
 
 def beyond_the_fit(off: Array, corners: Array, beyond: tuple[float, float], misfit: float) -> Array:

@@ -42,9 +42,6 @@ REASONS = {
     "interlaced": "odd and even rows show two circles; the fit takes their difference for noise and states too much",
     "phone": "a filter that keeps edges leaves a shadow's rim another form than any lens",
     "median": "as `phone`",
-    "equalised": "as `phone`: contrast is stretched differently from tile to tile",
-    "ink-thin": "thin print moves edges as a tone curve does, and is taken for one where its edges seem to lean",
-    "misprint": "a print that is 1 % longer one way has a circle that is, too; the form is fitted where that shows",
 }  # by kind, why it does not hold everything
 COLUMNS = ["kind", "views", "found", "classic", "sector", "wrong", "RMS", "bias", "norm", "on shared: ours, classic",
            "ours, sector", "mean, slowest s", "classic s", "sector s"]  # fmt: skip
