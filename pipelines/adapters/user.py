@@ -100,8 +100,10 @@ def check_call(function: Callable[..., Any], what: str, form: str, count: int, k
     """Whether a function takes `keyword` beside its `count` arguments.
 
     Raises:
-        UserError: it does not take so many arguments.
+        UserError: it does not take so many arguments, or its answer has to be awaited.
     """
+    if inspect.iscoroutinefunction(function):
+        raise UserError(f"{what} is an async function; it must be one that gives its answer when it is called")
     try:
         signature = inspect.signature(function)
     except (TypeError, ValueError):

@@ -6,7 +6,6 @@ import argparse
 import importlib
 import math
 import shutil
-import signal
 import sys
 import tempfile
 import time
@@ -20,6 +19,7 @@ import pyarrow as pa
 from datasets.store.dataset import open_dataset
 from tests.conftest import TINY, command
 from tests.hostile.running import Outcome, adopt_orphans, run_case
+from tests.signals import noted_signals
 
 KINDS = ("recipes", "tables", "pictures", "linear_images", "archives", "poses", "options", "functions", "arrays")
 
@@ -72,17 +72,9 @@ def _warm(source: Path, copy: Path) -> None:
             raise SystemExit(f"`{words[0]}` does not work, so that the cases would tell nothing")
 
 
-def _heeding_ends() -> list[int]:
-    """Signals that come from now on and end nothing: no case begins after one, and what there was is told."""
-    came: list[int] = []
-    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
-        signal.signal(number, lambda got, _: came.append(got))
-    return came
-
-
 def _all(asked: argparse.Namespace, source: Path, folder: Path, end: float) -> Iterator[tuple[str, Outcome]]:
     adopt_orphans()
-    stopped = _heeding_ends()
+    stopped = noted_signals()
     modules = {name: importlib.import_module(f"tests.hostile.kinds.{name}") for name in asked.only or KINDS}
     for number in range(asked.first, asked.first + asked.cases):
         for name, module in modules.items():

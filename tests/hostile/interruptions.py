@@ -16,6 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -25,7 +26,7 @@ from pipelines.__main__ import main as pipelines
 from tests.conftest import TINY
 from tests.hostile.__main__ import warmed
 from tests.hostile.running import adopt_orphans, orphans
-from tests.signals import heed_signals
+from tests.signals import heed_signals, noted_signals
 from tests.wrong_input import left_behind
 
 LIMIT_S = 300.0
@@ -41,16 +42,23 @@ def main() -> int:
         parser.add_argument(f"--{name}", type=int, default=0, help="so many runs")
     parser.add_argument("--seed", type=int, default=1)
     asked = parser.parse_args()
+    done: Counter[str] = Counter()
+    faults = 0
     with tempfile.TemporaryDirectory(prefix="interrupted-") as folder:
-        faults = [*_all(asked, Path(folder))]
-    for fault in faults:
-        print(f"FAULT {fault}")
-    print(f"{asked.kills} kills, {asked.signals} signals, {asked.files} limits on files, {asked.disks} full disks")
-    print(f"{len(faults)} faults")
+        for fault in _all(asked, Path(folder), done):
+            faults += 1
+            print(f"FAULT {fault}", flush=True)
+    told = {"kills": "kills", "signals": "signals", "files": "limits on files", "disks": "full disks"}
+    print(", ".join(f"{done[name]} of {getattr(asked, name)} {text}" for name, text in told.items()))
+    print(f"{faults} faults")
     return 1 if faults else 0
 
 
-def _all(asked: argparse.Namespace, folder: Path) -> Iterator[str]:
+def _all(asked: argparse.Namespace, folder: Path, done: Counter[str]) -> Iterator[str]:
+    """What is wrong, case by case. done: how many cases of each kind have ended, to be counted up.
+
+    A signal to this process ends it after the case that runs.
+    """
     warmed(folder)
     adopt_orphans()
     recipe = folder / "recipe.toml"
@@ -61,23 +69,34 @@ def _all(asked: argparse.Namespace, folder: Path) -> Iterator[str]:
         raise SystemExit(f"an undisturbed run ended with {code}: {error}")
     seconds, wanted = time.monotonic() - begin, content(folder / "undisturbed")
     print(f"an undisturbed run takes {seconds:.1f} s; content {wanted}", flush=True)
-    draw = random.Random(asked.seed)
+    draw, stopped = random.Random(asked.seed), noted_signals()
+    for name, case in _cases(asked, recipe, folder, wanted, lambda: draw.uniform(0.0, seconds)):
+        if stopped:
+            return
+        yield from case
+        done[name] += 1
+        print(f"{name} {done[name]} of {getattr(asked, name)}", flush=True)
+
+
+def _cases(
+    asked: argparse.Namespace, recipe: Path, folder: Path, wanted: str, moment: Callable[[], float]
+) -> Iterator[tuple[str, Iterator[str]]]:
+    """The kind of each case, and the case, which runs while its faults are taken."""
     for number in range(asked.kills):
-        root, moment = folder / f"kill{number}", draw.uniform(0.0, seconds)
-        yield from _killed(recipe, root, folder, moment, signal.SIGKILL)
-        yield from _resumed(recipe, root, folder, wanted, f"kill after {moment:.2f} s")
+        yield "kills", _stopped(recipe, folder / f"kill{number}", wanted, moment(), signal.SIGKILL)
     for number in range(asked.signals):
-        root, moment = folder / f"signal{number}", draw.uniform(0.0, seconds)
-        yield from _killed(recipe, root, folder, moment, SIGNALS[number % 3])
-        yield from _resumed(recipe, root, folder, wanted, f"{SIGNALS[number % 3].name} after {moment:.2f} s")
+        yield "signals", _stopped(recipe, folder / f"signal{number}", wanted, moment(), SIGNALS[number % 3])
     for number in range(asked.files):
-        yield from _limited(
-            recipe, folder / f"file{number}", folder, wanted, _between(number, asked.files, LEAST_FILE, MOST_FILE)
-        )
+        size = _between(number, asked.files, LEAST_FILE, MOST_FILE)
+        yield "files", _limited(recipe, folder / f"file{number}", folder, wanted, size)
     for number in range(asked.disks):
-        yield from _full(
-            recipe, folder / f"disk{number}", folder, wanted, _between(number, asked.disks, LEAST_DISK, MOST_DISK)
-        )
+        size = _between(number, asked.disks, LEAST_DISK, MOST_DISK)
+        yield "disks", _full(recipe, folder / f"disk{number}", folder, wanted, size)
+
+
+def _stopped(recipe: Path, root: Path, wanted: str, moment: float, number: signal.Signals) -> Iterator[str]:
+    yield from _killed(recipe, root, root.parent, moment, number)
+    yield from _resumed(recipe, root, root.parent, wanted, f"{number.name} after {moment:.2f} s")
 
 
 def started(recipe: Path, root: Path, folder: Path, before: Callable[[], None] = heed_signals) -> int:

@@ -66,7 +66,7 @@ VALUES = (
     "{}",
     "object()",
     "float('nan')",
-    "(I, float('inf') * t)",
+    "(I, np.full(3, np.inf))",
     "(I * float('nan'), t)",
     "(I, t * 1e300)",
     "(I, t * 1e31)",

@@ -177,6 +177,7 @@ WRONG = {
     "syntax error": ("def solve(:", "{}:solve", "failed with SyntaxError: invalid syntax"),
     "module that exits": ("raise SystemExit(3)", "{}:solve", "failed with SystemExit: 3"),
     "wrong arguments": ("def solve(image): pass", "{}:solve", "is (image); it must take (points_in_obj, points_px"),
+    "to be awaited": ("async def solve(a, b, c): pass", "{}:solve", "is an async function; it must be one that gives"),
     "wrong result": ("def solve(*a, **k): return 1, 2, 3, 4", "{}:solve", "gave 4 values"),
     "wrong shape": ("import numpy as np\ndef solve(*a): return np.zeros(3), np.zeros(3)", "{}:solve", "cv2.Rodrigues"),
     "no function named": ("def solve(): pass", "{}", "or give your own as package.module:function"),

@@ -15,7 +15,7 @@ import pytest
 from datasets.errors import UserError
 from datasets.url_path import dataset_folder
 from pipelines.engines.ray import RayEngine
-from tests.conftest import command
+from tests.conftest import TINY, command
 from tests.timeless import timeless
 
 pytestmark = pytest.mark.full
@@ -131,18 +131,11 @@ def test_a_task_whose_node_is_killed_runs_again_on_another(engine, cluster, seco
     assert nodes == {0: survivor, 1: survivor}
 
 
-@pytest.mark.parametrize("place", ["folder", "store"])
-def test_a_run_loses_one_of_two_nodes_and_has_the_content_of_a_local_one(
-    place, cluster, second, tiny, tmp_path, content, request
-):
-    """In a store, too, whose URL tells the nodes the access keys."""
-    recipe, local, out = tmp_path / "ten.toml", tmp_path / "local", str(tmp_path / "ray")
-    if place == "store":
-        out = f"s3://a:b@bucket/ray/demo?{request.getfixturevalue('server')}"
-    root = dataset_folder(out)
-    recipe.write_text(tiny[0].replace("step = 90", "step = 10"))
+def test_a_run_loses_one_of_two_nodes_and_has_the_content_of_a_local_one(cluster, second, tmp_path, content):
+    recipe, local, root = tmp_path / "ten.toml", tmp_path / "local", tmp_path / "ray"
+    recipe.write_text(TINY.replace("step = 90", "step = 10"))
     assert command("run", recipe, "--out", local, "-q") == 0
-    words = ["run", recipe, "--out", out, "-q", "--engine", "ray", "--ray-address", cluster.address]
+    words = ["run", recipe, "--out", root, "-q", "--engine", "ray", "--ray-address", cluster.address]
     process = subprocess.Popen([sys.executable, "-m", "pipelines", *map(str, words)], cwd=ROOT)
     wait_until(lambda: len(list((root / "frames").glob("[!.]*"))) >= BEFORE_KILL or process.poll() is not None)
     cluster.remove_node(second, allow_graceful=False)
@@ -151,3 +144,18 @@ def test_a_run_loses_one_of_two_nodes_and_has_the_content_of_a_local_one(
     assert content(root) == content(local)
     for name in ("manifest.json", "report.html"):
         assert timeless(root / name) == timeless(local / name)
+
+
+def test_a_store_is_filled_though_a_node_is_lost(cluster, second, server, tmp_path, content):
+    """The URL tells the nodes the access keys."""
+    recipe, local, url = tmp_path / "many.toml", tmp_path / "local", f"s3://a:b@bucket/ray/demo?{server}"
+    recipe.write_text(TINY.replace("step = 90", "step = 5"))
+    assert command("generate", recipe, "--out", local, "-q") == 0
+    words = ["generate", recipe, "--out", url, "-q", "--engine", "ray", "--ray-address", cluster.address]
+    process = subprocess.Popen([sys.executable, "-m", "pipelines", *map(str, words)], cwd=ROOT)
+    root = dataset_folder(url)
+    wait_until(lambda: len(list((root / "frames").glob("*"))) >= BEFORE_KILL or process.poll() is not None)
+    cluster.remove_node(second, allow_graceful=False)
+    assert len(list((root / "frames").glob("*"))) < len(list((local / "frames").glob("*")))
+    assert process.wait(2 * PATIENCE_S) == 0
+    assert content(root) == content(local)
