@@ -28,11 +28,9 @@ BLUR_LIMITS_PX = (0.2956, 8.0)  # no picture is sharper than its pixels' own are
 LEAST_NOISE = 0.04  # variance, grey levels^2: half of what rounding to whole grey levels leaves
 FURTHEST_STEP = (0.7, 0.7, 0.15, 0.15, 0.4)  # of the first numbers in one iteration; the others are linear
 LEAST_PIXELS = 24
-SPOILED_NOISES, LEAST_SPOILED = (
-    25.0,
-    20.0,
-)  # variances of the noise that a residual's square must exceed, and grey levels
-MOST_SPOILED = 20  # pixels of a corner that no model explains and that are left out: more of them are no single ones
+SPOILED_NOISES = 25.0  # variances of the noise that the square of a residual must exceed to be no noise
+LEAST_SPOILED = 20.0  # grey levels that it must exceed
+MOST_SPOILED = 10  # pixels of a corner that no model explains and that are left out: more of them are no single ones
 
 
 class CornerFits(NamedTuple):
@@ -134,8 +132,11 @@ def _leave_out_spoiled(pixels: CornerPixels, n: int, noise: float) -> int:
     square = pixels.residual[worst] ** 2
     if n <= LEAST_PIXELS or square <= SPOILED_NOISES * noise or square <= LEAST_SPOILED * LEAST_SPOILED:
         return n
-    pixels.x[worst], pixels.y[worst], pixels.grey[worst] = pixels.x[n - 1], pixels.y[n - 1], pixels.grey[n - 1]
-    return n - 1
+    last = n - 1
+    pixels.x[worst], pixels.x[last] = pixels.x[last], pixels.x[worst]
+    pixels.y[worst], pixels.y[last] = pixels.y[last], pixels.y[worst]
+    pixels.grey[worst], pixels.grey[last] = pixels.grey[last], pixels.grey[worst]
+    return last
 
 
 @inlined
@@ -210,7 +211,7 @@ def _fit_all(
         if n < LEAST_PIXELS:
             continue
         p = fitted[i]
-        cost, damping, noise, settled, least = -1.0, 1e-4, 0.0, False, n - MOST_SPOILED
+        cost, damping, noise, settled, whole = -1.0, 1e-4, 0.0, False, n
         for count in range(-1 if _begin(shapes[i], trial, p) else 0, steps):
             draw(trial, n, edges[i], sharp[i], pixels)  # the one place: each copy takes seconds to compile
             if count < 0:
@@ -231,11 +232,13 @@ def _fit_all(
                 break
             if settled or _move(p, step, right, trial) <= stop * stop * noise:
                 _copy(trial, p)
-                left = _leave_out_spoiled(pixels, n, noise) if n > least else n
+                converged[i] = True  # also where the steps do not suffice for all spoiled pixels
+                left = _leave_out_spoiled(pixels, n, noise) if n <= whole else n
                 if left < n:
                     n, cost, damping, settled = left, -1.0, 1e-4, False
+                    if n < whole - MOST_SPOILED:
+                        n, whole = whole, 0  # they are no single ones: all take part
                     continue
-                converged[i] = True
                 break
         converged[i] = _invert(system, covariances[i]) and converged[i]
         noises[i] = noise
