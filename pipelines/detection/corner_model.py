@@ -32,6 +32,7 @@ SPOILED_NOISES, LEAST_SPOILED = (
     25.0,
     20.0,
 )  # variances of the noise that a residual's square must exceed, and grey levels
+MOST_TOGETHER = 2  # neighbours that lie half as far off: three are the edge of something
 MOST_SPOILED = 20  # pixels of a corner that no model explains and that are left out: more of them are no single ones
 
 
@@ -125,7 +126,8 @@ def _noise(jacobian: Array, residual: Array, n: int) -> float:
 def _leave_out_spoiled(pixels: CornerPixels, n: int, noise: float) -> int:
     """Number of pixels that are left: the one farthest from the model is taken out if no noise explains it.
 
-    A pixel that is white or black whatever falls on it may lie, upon an edge, between its neighbours' values.
+    A pixel that is white or black whatever falls on it may lie, upon an edge, between its neighbours' values. Where its
+    neighbours are as far off, it is no single pixel but the edge of what covers the board, or of a shadow.
     """
     worst = 0
     for i in range(n):
@@ -133,6 +135,13 @@ def _leave_out_spoiled(pixels: CornerPixels, n: int, noise: float) -> int:
             worst = i
     square = pixels.residual[worst] ** 2
     if n <= LEAST_PIXELS or square <= SPOILED_NOISES * noise or square <= LEAST_SPOILED * LEAST_SPOILED:
+        return n
+    beside = 0
+    for i in range(n):
+        is_near = abs(pixels.x[i] - pixels.x[worst]) < 1.5 and abs(pixels.y[i] - pixels.y[worst]) < 1.5
+        if is_near and 4.0 * pixels.residual[i] ** 2 > square:
+            beside += 1
+    if beside > MOST_TOGETHER:
         return n
     pixels.x[worst], pixels.y[worst], pixels.grey[worst] = pixels.x[n - 1], pixels.y[n - 1], pixels.grey[n - 1]
     return n - 1
