@@ -30,7 +30,8 @@ FURTHEST_STEP = (0.7, 0.7, 0.15, 0.15, 0.4)  # of the first numbers in one itera
 LEAST_PIXELS = 24
 SPOILED_NOISES = 25.0  # variances of the noise that the square of a residual must exceed to be no noise
 LEAST_SPOILED = 20.0  # grey levels that it must exceed
-MOST_SPOILED = 10  # pixels of a corner that no model explains and that are left out: more of them are no single ones
+MOST_TOGETHER = 2  # neighbours that lie half as far off: three are the edge of something
+MOST_SPOILED = 10  # single pixels of a corner that are left out
 
 
 class CornerFits(NamedTuple):
@@ -123,7 +124,8 @@ def _noise(jacobian: Array, residual: Array, n: int) -> float:
 def _leave_out_spoiled(pixels: CornerPixels, n: int, noise: float) -> int:
     """Number of pixels that are left: the one farthest from the model is taken out if no noise explains it.
 
-    A pixel that is white or black whatever falls on it may lie, upon an edge, between its neighbours' values.
+    A pixel that is white or black whatever falls on it may lie, upon an edge, between its neighbours' values. Where its
+    neighbours are as far off, it is no single pixel but the edge of what covers the board, or of a shadow.
     """
     worst = 0
     for i in range(n):
@@ -132,11 +134,15 @@ def _leave_out_spoiled(pixels: CornerPixels, n: int, noise: float) -> int:
     square = pixels.residual[worst] ** 2
     if n <= LEAST_PIXELS or square <= SPOILED_NOISES * noise or square <= LEAST_SPOILED * LEAST_SPOILED:
         return n
-    last = n - 1
-    pixels.x[worst], pixels.x[last] = pixels.x[last], pixels.x[worst]
-    pixels.y[worst], pixels.y[last] = pixels.y[last], pixels.y[worst]
-    pixels.grey[worst], pixels.grey[last] = pixels.grey[last], pixels.grey[worst]
-    return last
+    beside = 0
+    for i in range(n):
+        is_near = abs(pixels.x[i] - pixels.x[worst]) < 1.5 and abs(pixels.y[i] - pixels.y[worst]) < 1.5
+        if is_near and 4.0 * pixels.residual[i] ** 2 > square:
+            beside += 1
+    if beside > MOST_TOGETHER:
+        return n
+    pixels.x[worst], pixels.y[worst], pixels.grey[worst] = pixels.x[n - 1], pixels.y[n - 1], pixels.grey[n - 1]
+    return n - 1
 
 
 @inlined
@@ -211,7 +217,7 @@ def _fit_all(
         if n < LEAST_PIXELS:
             continue
         p = fitted[i]
-        cost, damping, noise, settled, whole = -1.0, 1e-4, 0.0, False, n
+        cost, damping, noise, settled, least = -1.0, 1e-4, 0.0, False, n - MOST_SPOILED
         for count in range(-1 if _begin(shapes[i], trial, p) else 0, steps):
             draw(trial, n, edges[i], sharp[i], pixels)  # the one place: each copy takes seconds to compile
             if count < 0:
@@ -233,11 +239,9 @@ def _fit_all(
             if settled or _move(p, step, right, trial) <= stop * stop * noise:
                 _copy(trial, p)
                 converged[i] = True  # also where the steps do not suffice for all spoiled pixels
-                left = _leave_out_spoiled(pixels, n, noise) if n <= whole else n
+                left = _leave_out_spoiled(pixels, n, noise) if n > least else n
                 if left < n:
                     n, cost, damping, settled = left, -1.0, 1e-4, False
-                    if n < whole - MOST_SPOILED:
-                        n, whole = whole, 0  # they are no single ones: all take part
                     continue
                 break
         converged[i] = _invert(system, covariances[i]) and converged[i]
