@@ -64,7 +64,8 @@ def fit_in_any_light(patch: Patch, known: Prior, height: float, light: float) ->
         unexplained = _unexplained(plain, patch, known, height, light)
     if unexplained <= MISSING or not plain.converged:
         return plain
-    fit = fit_disc(*_lit(patch, known, MANY, MANY_SOFTNESS, height, light))
+    lamps = (FEW, FEW_SOFTNESS) if patch.blocked.size > MANY_CELLS else (MANY, MANY_SOFTNESS)
+    fit = fit_disc(*_lit(patch, known, *lamps, height, light))
     return replace(fit, covariance=fit.covariance * LEFT_OUT**2) if fit.converged else plain
 
 
