@@ -17,7 +17,6 @@ LIMIT_SPREADS, MOST_SHARE = 4.0, 0.15  # or so many median distances, up to this
 SHARP_SPREADS, SHARP_PX = 12.0, 0.1  # but no more than so many median distances, nor less than this: beside what covers
 # a part of the board a corner may be half a pixel off where all others agree to a hundredth
 PLACED_PX = 0.1  # deviation of a corner that something else placed, until their scatter is known
-OWN_SPREADS = 6.0  # or than so many of its own, which is as much larger as its pixels tell less of it
 BAD_SHARE = 0.25  # of the corners that may be inconsistent before the board is, and one of few in any case
 
 
@@ -63,8 +62,7 @@ def _agreeing(corners: Corners, at: Array, size: tuple[int, int]) -> Corners:
         weights, board = _weights(corners.covariance_px2, good), _map_through(corners, good, board, at, size)
         distance, spread = _left_out(points, board, at, weights)
         typical = float(np.median(distance[good])) * spread
-        limits = _limits(side, typical, spread, _relative(corners.covariance_px2, good))
-        excess = np.where(good, distance / limits, 0.0)
+        excess = np.where(good, distance / _limits(side, typical, spread), 0.0)
         worst = int(np.argmax(excess))
         if excess[worst] <= 1.0:
             back = _taken_back(corners, good, board, at, weights)
@@ -98,23 +96,21 @@ def _taken_back(corners: Corners, good: Mask, board: BoardMap, at: Array, weight
     missed = corners.points_px - board(at)
     usual = float(np.median(_left_out(corners.points_px, board, at, weights)[0][good]))
     side = np.sqrt(np.abs(np.linalg.det(board.jacobian(at[lost]))))
-    relative, same = _relative(corners.covariance_px2, good)[lost], np.ones(len(lost))
-    back[lost] = np.linalg.norm(missed[lost], axis=1) <= _limits(side, usual * same, same, relative)
+    same = np.ones(len(lost))
+    back[lost] = np.linalg.norm(missed[lost], axis=1) <= _limits(side, usual * same, same)
     extended = smooth_extension(at[good], missed[good], at[lost], missed[lost], usual)
     if extended is not None:
-        limits = _limits(side, extended.typical * extended.spread, same, relative)
+        limits = _limits(side, extended.typical * extended.spread, same)
         back[lost] |= np.linalg.norm(extended.missed, axis=1) <= limits
     return back
 
 
-def _limits(side: Array, typical: Array, spread: Array, relative: Array) -> Array:
+def _limits(side: Array, typical: Array, spread: Array) -> Array:
     """(n,) largest distances from the map through the others, px.
 
     side: (n,) of the local squares, px. typical: (n,) median distance times `spread`, px. spread: see `_left_out`.
-    relative: (n,) deviation that is stated for each over the median one.
     """
-    sharp = np.maximum(np.maximum(SHARP_SPREADS, OWN_SPREADS * relative) * typical, SHARP_PX * spread)
-    usual = np.minimum(np.maximum(LIMIT_PX, LIMIT_SHARE * side), sharp)
+    usual = np.minimum(np.maximum(LIMIT_PX, LIMIT_SHARE * side), np.maximum(SHARP_SPREADS * typical, SHARP_PX * spread))
     return np.maximum(usual, np.minimum(LIMIT_SPREADS * typical, MOST_SHARE * side))
 
 
@@ -147,12 +143,6 @@ def _weights(covariance: Array, good: Mask) -> Array:
 def hold_of(covariance: Array, good: Mask) -> Hold:
     """How firmly corners with (n, 2, 2) covariances leave the lens of their map where it usually is."""
     return Hold(float(np.sqrt(0.5 * np.median(np.trace(covariance[good], axis1=1, axis2=2)))))
-
-
-def _relative(covariance: Array, good: Mask) -> Array:
-    """(n,) deviations over the median one of the good ones."""
-    deviation = np.sqrt(0.5 * np.trace(covariance, axis1=1, axis2=2))
-    return deviation / np.median(deviation[good])
 
 
 def _left_out(points: Array, board: BoardMap, at: Array, weights: Array) -> tuple[Array, Array]:

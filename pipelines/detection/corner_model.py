@@ -31,6 +31,7 @@ LEAST_PIXELS = 24
 SPOILED_NOISES = 25.0  # variances of the noise that the square of a residual must exceed to be no noise
 LEAST_SPOILED = 20.0  # grey levels that it must exceed
 MOST_SPOILED = 10  # pixels of a corner that no model explains and that are left out: more of them are no single ones
+MOST_TOGETHER = 2  # of it and its neighbours that lie half as far off: three are the edge of something
 
 
 class CornerFits(NamedTuple):
@@ -123,7 +124,8 @@ def _noise(jacobian: Array, residual: Array, n: int) -> float:
 def _leave_out_spoiled(pixels: CornerPixels, n: int, noise: float) -> int:
     """Number of pixels that are left: the one farthest from the model is taken out if no noise explains it.
 
-    A pixel that is white or black whatever falls on it may lie, upon an edge, between its neighbours' values.
+    A pixel that is white or black whatever falls on it may lie, upon an edge, between its neighbours' values. Where its
+    neighbours are as far off, it is no single pixel but the edge of what covers the board, or of a shadow.
     """
     worst = 0
     for i in range(n):
@@ -131,6 +133,13 @@ def _leave_out_spoiled(pixels: CornerPixels, n: int, noise: float) -> int:
             worst = i
     square = pixels.residual[worst] ** 2
     if n <= LEAST_PIXELS or square <= SPOILED_NOISES * noise or square <= LEAST_SPOILED * LEAST_SPOILED:
+        return n
+    beside = 0
+    for i in range(n):
+        is_near = abs(pixels.x[i] - pixels.x[worst]) < 1.5 and abs(pixels.y[i] - pixels.y[worst]) < 1.5
+        if is_near and 4.0 * pixels.residual[i] ** 2 > square:
+            beside += 1
+    if beside > MOST_TOGETHER:
         return n
     last = n - 1
     pixels.x[worst], pixels.x[last] = pixels.x[last], pixels.x[worst]

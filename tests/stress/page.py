@@ -31,11 +31,8 @@ and of circles {NORMALISED[0]} to {NORMALISED[1]} (20 circles tell it to 11 %), 
 REASONS = {
     "rolling-shake": "rows are moved by a wave two squares long, so that neighbours are moved against each other as by "
     "errors of their own; nothing in one picture tells that from noise, and the stated error is too large",
-    "shadow-edge": "where the shadow's edge crosses the circle, nothing tells which way the board lies; a few corners "
-    "lie on the edge itself",
-    "hot-pixels": "a black pixel upon an edge lies within the grey values of its neighbours and is not taken out; the "
-    "corner is refused",
-    "salt-pepper": "as `hot-pixels`",
+    "shadow-edge": "a few corners lie on the shadow's edge itself",
+    "salt-pepper": "a corner with several spoiled pixels side by side is refused",
     "small": "beside the circle, squares of 9 px leave a corner no pixels that are surely free of the circle's shade",
     "ghost": "the reflected picture is smooth and moves neighbours alike, which the stated error takes for a misfit of "
     "the map; upon the circle it looks like a shadow",
