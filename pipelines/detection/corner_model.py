@@ -30,7 +30,7 @@ FURTHEST_STEP = (0.7, 0.7, 0.15, 0.15, 0.4)  # of the first numbers in one itera
 LEAST_PIXELS = 24
 SPOILED_NOISES = 25.0  # variances of the noise that the square of a residual must exceed to be no noise
 LEAST_SPOILED = 20.0  # grey levels that it must exceed
-MOST_TOGETHER = 2  # neighbours that lie half as far off: three are the edge of something
+MOST_TOGETHER = 2  # of it and its neighbours that lie half as far off: three are the edge of something
 MOST_SPOILED = 10  # single pixels of a corner that are left out
 
 

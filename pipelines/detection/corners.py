@@ -87,11 +87,12 @@ def refine_corners(
         corners = replace(corners, board=_next_map(corners, corners.board, at, size))
         beyond = widths_beyond(light, corners.board, sites, corners.blur_px)
         corners = replace(corners, widths_beyond_px=(float(beyond[0]), float(beyond[1])))
-        if len(at) < FEW:
-            added = form_errors(corners, at, min(sites.reach, limits.reach), size)
-            corners = replace(corners, covariance_px2=corners.covariance_px2 + added)
         sites, corners = _with_nearby(light, sites, unseen, corners)
-    return drop_inconsistent(corners, sites.at, size)
+    corners = drop_inconsistent(corners, sites.at, size)
+    if len(at) >= FEW or not np.any(corners.consistent):
+        return corners
+    added = form_errors(corners, sites.at, min(sites.reach, limits.reach), size)
+    return replace(corners, covariance_px2=corners.covariance_px2 + added)
 
 
 def _with_nearby(
