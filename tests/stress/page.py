@@ -31,7 +31,7 @@ and of circles {NORMALISED[0]} to {NORMALISED[1]} (20 circles tell it to 11 %), 
 REASONS = {
     "rolling-shake": "rows are moved by a wave two squares long, so that neighbours are moved against each other as by "
     "errors of their own; nothing in one picture tells that from noise, and the stated error is too large",
-    "shadow-edge": "a few corners lie on the shadow's edge itself",
+    "shadow-edge": "a few corners lie on the shadow's edge itself, and on one board nothing tells which way it lies",
     "salt-pepper": "a corner with several spoiled pixels side by side is refused",
     "small": "beside the circle, squares of 9 px leave a corner no pixels that are surely free of the circle's shade",
     "ghost": "the reflected picture is smooth and moves neighbours alike, which the stated error takes for a misfit of "
