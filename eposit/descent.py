@@ -19,7 +19,8 @@ def to_minimum(problem: Problem, start: Pose) -> Solution:
 
     n, w = len(problem.points_in_obj), workspace(problem.camera, len(problem.points_in_obj))
     obj, weights = np.ascontiguousarray(problem.points_in_obj), inverse_covariances(problem.weights)
-    pixels, starts = np.ascontiguousarray(problem.points_px), np.hstack((start.R.reshape(-1, 9), start.t))
+    pixels = np.ascontiguousarray(problem.points_px)
+    starts = np.ascontiguousarray(np.hstack((start.R.reshape(-1, 9), start.t)))  # hstack keeps the order of a transpose
 
     def run(out: Array, first: int, stop: int) -> None:
         native(refine_poses)(
