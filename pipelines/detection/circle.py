@@ -146,7 +146,10 @@ class _Place:
         if around is None:
             return near
         known = self._known(around)
-        far = self._fit(around, replace(known, start=_best_start(around, known, self.unsure, self.radius)))
+        start = _best_start(around, known, self.unsure, self.radius)
+        if near is not None and around.blocked.size > MANY_CELLS and _is_beside(near, start, self.unsure, self.radius):
+            return near
+        far = self._fit(around, replace(known, start=start))
         if near is None:
             return far
         if not near.converged:
@@ -255,13 +258,25 @@ def _best_start(patch: Patch, known: Prior, unsure: Array, radius: float) -> Arr
     unsure: covariance of the prediction, see `_unsure`. radius: of the circle, squares.
     """
     looks = LOOKS if patch.blocked.size <= MANY_CELLS else FEWER_LOOKS
-    variances, axes = np.linalg.eigh(unsure[:2, :2])
-    reach = np.minimum(LOOK_SPREADS * np.sqrt(np.maximum(variances, 0.0)), FARTHEST_SHARE) / radius
+    reach, axes = _looked_at(unsure, radius)
     minor, major = (np.linspace(-far, far, count) for far, count in zip(reach, looks, strict=True))
     starts = [
         known.start + np.append(a * axes[:, 0] + b * axes[:, 1], np.zeros(SHAPE - 2)) for a in minor for b in major
     ]
     return min(starts, key=lambda start: cost_of(patch, known, start))
+
+
+def _looked_at(unsure: Array, radius: float) -> tuple[Array, Array]:
+    """(2,) half axes, radii, of the ellipse in which the circle is looked for, and (2, 2) their directions, columns."""
+    variances, axes = np.linalg.eigh(unsure[:2, :2])
+    return np.minimum(LOOK_SPREADS * np.sqrt(np.maximum(variances, 0.0)), FARTHEST_SHARE) / radius, axes
+
+
+def _is_beside(fit: DiscFit, start: Array, unsure: Array, radius: float) -> bool:
+    """Whether a fit, of a large circle, has arrived beside the best start: a fit from there would come to the same."""
+    reach, axes = _looked_at(unsure, radius)
+    apart = np.abs(axes.T @ (fit.values[:2] - start[:2]))
+    return fit.converged and bool(np.all(apart <= 2.0 * reach / (np.array(FEWER_LOOKS) - 1.0)))
 
 
 def _is_near(shift: Array, unsure: Array) -> bool:

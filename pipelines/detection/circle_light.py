@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from eposit.arrays import Array
-from pipelines.detection.circle_model import cost_of, fit_disc, shadow_of
+from pipelines.detection.circle_model import STEPS, cost_of, fit_disc, shadow_of
 from pipelines.detection.circle_numbers import (
     BLOCKED,
     DISC_SLOPE,
@@ -32,6 +32,7 @@ STARTS = ((0.0, 1), (1.0, 6))  # where the one shadow is looked for if it seems 
 TRIED, MANY_CELLS = 3, 20000  # of these starts are fitted, and one where the fine grid has more cells, for its time
 FEW, FEW_SOFTNESS = ((0.5, 6), (1.2, 8), (2.4, 8)), 0.3
 MANY, MANY_SOFTNESS = ((0.4, 6), (0.8, 8), (1.2, 10), (1.8, 12), (2.6, 12)), 0.2
+FEWER_STEPS = 30  # of a fit of a large circle with further shadows, for its time
 SPREAD = 0.1  # of the white's grey: light that may come from each direction beyond that of lamp and surroundings
 MUCH_CLIPPED = 0.1  # of the pixels: edges look sharper than they are, and little of the shadow is left to see
 DOUBTFUL = 1.05  # times as much as is left of the residuals with further shadows: the one may be in a wrong place
@@ -64,9 +65,12 @@ def fit_in_any_light(patch: Patch, known: Prior, height: float, light: float) ->
         unexplained = _unexplained(plain, patch, known, height, light)
     if unexplained <= MISSING or not plain.converged:
         return plain
-    lamps = (FEW, FEW_SOFTNESS) if patch.blocked.size > MANY_CELLS else (MANY, MANY_SOFTNESS)
-    fit = fit_disc(*_lit(patch, known, *lamps, height, light))
-    return replace(fit, covariance=fit.covariance * LEFT_OUT**2) if fit.converged else plain
+    large = patch.blocked.size > MANY_CELLS
+    lamps = (FEW, FEW_SOFTNESS) if large else (MANY, MANY_SOFTNESS)
+    fit = fit_disc(*_lit(patch, known, *lamps, height, light), FEWER_STEPS if large else STEPS)
+    if not fit.converged or fit.residual * DOUBTFUL > plain.residual:
+        return plain  # many shadows that explain no more have led the disc astray
+    return replace(fit, covariance=fit.covariance * LEFT_OUT**2)
 
 
 def _in_any_form(fit: DiscFit, patch: Patch, known: Prior) -> tuple[DiscFit, Prior]:

@@ -133,7 +133,7 @@ def _blurred(fine: Array, kernel: Array, finer: int, rows: Places, columns: Plac
     return out
 
 
-def fit_disc(patch: Patch, prior: Prior) -> DiscFit:
+def fit_disc(patch: Patch, prior: Prior, steps: int = STEPS) -> DiscFit:
     """Fit one disc by Levenberg and Marquardt; the linear numbers are the best ones at each shape.
 
     The loop is NumPy's, what takes time is compiled: a picture has one circle, and Numba needs seconds for a loop.
@@ -143,7 +143,7 @@ def fit_disc(patch: Patch, prior: Prior) -> DiscFit:
     normal, right = np.eye(len(values)), np.zeros(len(values))
     jacobian, best = np.zeros((len(patch.grey), len(values))), np.zeros(len(patch.grey))
     cost, damping, noise = np.inf, 1e-3, START_NOISE
-    for _ in range(STEPS):
+    for _ in range(steps):
         picture = _draw(patch, trial)
         weigh = noise / prior.spread**2
         trial[SHAPE:] = _best_levels(picture.basis, patch.grey, weigh[SHAPE:], prior.mean[SHAPE:])
