@@ -13,7 +13,7 @@ MISFIT_SHARE = 0.05  # of the map's misfit, by which a bent sheet moves it
 CORNERS_SHARE = 0.13  # of the corners' stated error that a circle has at least: what moves them moves it
 USUALLY_BEYOND_PX = 0.1  # by which edges differ from those of a gaussian blur in ordinary pictures, defocus included
 WIDTH_ERRORS = 6.0  # corners' stated errors by which noise alone makes edges differ from it
-BEYOND_SHARE, APART_SHARE = 0.09, 0.3  # of what they differ by more, and along one axis more than along the other, by
+BEYOND_SHARE, APART_SHARE = 0.085, 0.3  # of what they differ by more, and along one axis more than along the other, by
 # which a circle may be off: its shade looks like what sharpening and motion leave beside an edge
 USUAL_SIZE = 0.0005  # by which a fit that explains the picture finds another size than the map's
 SURE_SIZE = 0.5  # deviations of the map's size that also say nothing
