@@ -62,9 +62,9 @@ def test_every_shard_tells_what_it_holds(table, tiny):
 
 
 def test_a_footer_is_small(tiny):
-    """A score's has 5.0 kB, and had 9.6 kB with Arrow's copy of the schema; 5.3 kB leaves room for a column or two."""
+    """A score's has 5.5 kB, and had 9.6 kB with Arrow's copy of the schema; 5.8 kB leaves room for a column or two."""
     for path in (tiny[1] / "scores").iterdir():
-        assert pq.read_metadata(path).serialized_size < 5300
+        assert pq.read_metadata(path).serialized_size < 5800
 
 
 def expected_of(root, path):

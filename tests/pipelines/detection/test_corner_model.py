@@ -153,7 +153,7 @@ def test_too_few_pixels_give_nan():
     corners = rng.uniform(-0.5, 0.5, (10, 2))
     image = digitised(mosaic(scene, corners), rng, 0.0)
     reaches = np.full((10, 2), REACH)
-    reaches[0] = 0.1  # two pixels along both axes
+    reaches[0] = 0.05  # a pixel along both axes
     discs = np.array([[HALF + TILE * 1.0, HALF]])
     error, shapes, covariance, noise, converged = fitted(
         image, corners, scene, rng, reaches=reaches, discs=discs, disc_axes=np.eye(2) / 13.0
