@@ -27,7 +27,7 @@ from pipelines.detection.kernels import compiled, compiled_part, inlined
 BLUR_LIMITS_PX = (0.2956, 8.0)  # no picture is sharper than its pixels' own area
 LEAST_NOISE = 0.04  # variance, grey levels^2: half of what rounding to whole grey levels leaves
 FURTHEST_STEP = (0.7, 0.7, 0.15, 0.15, 0.4)  # of the first numbers in one iteration; the others are linear
-LEAST_PIXELS = 14  # five more than a shape has numbers: squares of 3.5 px have them
+LEAST_PIXELS = 14  # five more than a shape has numbers: squares of 4 px have them
 SPOILED_NOISES = 25.0  # variances of the noise that the square of a residual must exceed to be no noise
 LEAST_SPOILED = 20.0  # grey levels that it must exceed
 MOST_TOGETHER = 2  # of it and its neighbours that lie half as far off: three are the edge of something
