@@ -85,7 +85,7 @@ def _detected(run: Run, item: FramePoints) -> Iterator[str]:
 
 def _best(run: Run) -> Series | None:
     """The setting with the smallest position error, of those that are given no true points."""
-    scored = [item for item in run.found if item.key["point_source"] != TRUTH and not np.all(item.failed)]
+    scored = [item for item in run.found if item.key["point_source"] != TRUTH and np.any(np.isfinite(item.position_mm))]
     return min(scored, key=lambda item: float(np.nanmedian(item.position_mm)), default=None)
 
 
