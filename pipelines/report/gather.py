@@ -9,7 +9,7 @@ from typing import Any
 from datasets.store.dataset import Dataset
 from pipelines.report.data import SCORE_COLUMNS, series
 from pipelines.report.point_tables import PointTally
-from pipelines.report.points import errors_of
+from pipelines.report.points import check_all_there, errors_of
 from pipelines.report.run import Run
 
 KEPT = ("frame_id", "pose_id", "time_s", "camera_name", "tilt_deg")
@@ -20,7 +20,7 @@ def gathered(dataset: Dataset) -> tuple[Run, list[PointTally]]:
     """A run that has been scored, and what is kept of each detector's points.
 
     Raises:
-        UserError: a stage is missing or a shard damaged.
+        UserError: a stage is missing or a shard damaged, or a detector's points are there for some frames only.
     """
     frames: list[dict[str, Any]] = []
     tallies: dict[str, PointTally] = {}
@@ -35,6 +35,8 @@ def gathered(dataset: Dataset) -> tuple[Run, list[PointTally]]:
             frames.append({name: row[name] for name in KEPT})
     found = series(dataset.each_shard("scores", list(SCORE_COLUMNS)))
     points = list(tallies.values())
+    for item in points:
+        check_all_there(item.detector, len(item.frames.corners), len(frames))
     return Run(dataset.recipe, frames, [item.frames for item in points], found), points
 
 

@@ -10,9 +10,10 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from datasets.errors import UserError
 from datasets.rows import covariances_by_frame, numbers, of_detector, points_by_frame
 from datasets.store.dataset import Dataset
-from eposit.arrays import Array, Mask
+from eposit.arrays import Array, Mask, shown
 from pipelines.statistics import whitened
 from render.targets.kinds import AnyTarget
 
@@ -41,10 +42,27 @@ def point_errors(dataset: Dataset, frames: Sequence[dict[str, Any]]) -> list[Poi
     return errors_of(dataset.recipe.target, frames, dataset.read("keypoints"), dataset.read("detections"))
 
 
+def check_all_there(detector: str, found: float, frames: int) -> None:
+    """Refuse a detector whose points are there for `found` of so many frames only.
+
+    Raises:
+        UserError: they are not there for all.
+    """
+    if found != frames:
+        raise UserError(
+            f"points of the detector {shown(detector)} are there for {found:g} of {frames} frames; run the detect "
+            "stage with it to its end, or see what `verify` says"
+        )
+
+
 def errors_of(
     target: AnyTarget, frames: Sequence[dict[str, Any]], truth: pa.Table, found: pa.Table
 ) -> list[PointErrors]:
-    """One for each detector. truth and found: rows of `keypoints` and `detections` of these frames, in their order."""
+    """One for each detector. truth and found: rows of `keypoints` and `detections` of these frames, in their order.
+
+    Raises:
+        UserError: a detector's points are there for some of the frames only.
+    """
     ids, n = [frame["frame_id"] for frame in frames], len(target.points)
     points = points_by_frame(truth, target)
     true = np.stack([points[i] for i in ids])
@@ -59,7 +77,9 @@ def errors_of(
     errors: list[PointErrors] = []
     for detector in dict.fromkeys(found["detector"].to_pylist()):
         rows = of_detector(found, detector)
+        check_all_there(detector, rows.num_rows / n, len(ids))
         points, covariances = points_by_frame(rows, target), covariances_by_frame(rows, target)
+        check_all_there(detector, sum(i in points for i in ids), len(ids))
         error = np.stack([points[i] for i in ids]) - true
         covariance = np.stack([covariances[i] for i in ids])
         status = rows["status"].to_numpy(zero_copy_only=False).astype(str).reshape(-1, n)
