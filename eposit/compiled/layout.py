@@ -9,10 +9,8 @@ LENS = 0  # (8) kind, theta_max (rad), rho_max, least cosine of a pose's points,
 INTRINSICS = 8  # (4) fx, fy, cx, cy, px
 CENTRE = 12  # (3) centroid of the object points
 SIZE = 15  # their RMS distance from it
-ANGULAR, KNOWN = (
-    36,
-    37,
-)  # 1 where residuals are angles: the image is stereographic, with f = 1, and its scale is divided out; minima found
+ANGULAR = 36  # 1 where residuals are angles: the image is stereographic, with f = 1, and its scale is divided out
+KNOWN = 37  # minima found
 REACH, THICKNESS, FLATNESS, SOLID = 16, 17, 18, 19  # what `describe` says
 PLANE = 20  # (9) axes of the object's spread, rows of a rotation
 CORNERS = 29  # (3) three points of large area

@@ -88,16 +88,10 @@ class BoardMap:
         where fx is twice fy, say.
         """
         used, held = weights > 0.0, _held(size, weights, hold)
-        best, least = None, np.inf
-        for start in _starts(at, corners_px, size, used):
-            board = replace(start, lift=lift)
-            for _ in range(2):  # the first may stop in a narrow valley
-                board = board.fitted(at, corners_px, weights, held)
-            cost = float(weights[used] @ np.sum((corners_px - board(at))[used] ** 2, axis=1))
-            if best is None or cost < least:
-                best, least = board, cost
-        assert best is not None  # there is always a start
-        return best
+        starts = [replace(start, lift=lift) for start in _starts(at, corners_px, size, used)]
+        # Twice: the first fit may stop in a narrow valley.
+        fits = [start.fitted(at, corners_px, weights, held).fitted(at, corners_px, weights, held) for start in starts]
+        return min(fits, key=lambda fit: float(weights[used] @ np.sum((corners_px - fit(at))[used] ** 2, axis=1)))
 
     def fitted(self, at: Array, corners_px: Array, weights: Array, held: Array) -> BoardMap:
         """This map after steps of least squares; see `fit` and, for `held`, `generic_lens.fit`."""

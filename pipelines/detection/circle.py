@@ -150,9 +150,7 @@ class _Place:
         if near is not None and around.blocked.size > MANY_CELLS and _is_beside(near, start, self.unsure, self.radius):
             return near
         far = self._fit(around, replace(known, start=start))
-        if near is None:
-            return far
-        if not near.converged:
+        if near is None or not near.converged:
             return far
         left, best = (cost_of(around, known, fit.values[:SHAPE]) for fit in (near, far))
         good = GOOD_SHARE * best + ROUNDING * len(around.grey)

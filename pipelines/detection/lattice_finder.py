@@ -39,11 +39,8 @@ FIRM = 0.85  # of the lattice's median likeness: a point that looks less like a 
 FIRM_CONTRAST = 0.25  # of its median contrast, likewise
 ENOUGH_PX = 16.0  # px of a level to a square: more show no more corners
 TOLD = (PointStatus.OK, PointStatus.MIRRORED)  # what is said where the picture tells which corner is which
-CHANCE_SHARE, CHANCE_LIKENESS = (
-    0.6,
-    0.95,
-)  # of a line's places, and of the median likeness: less, beside a full line, is
-# is what the edges of other things happen to make where a board without a margin ends
+CHANCE_SHARE = 0.6  # of an outermost line's places: fewer points beside a full line may be of other things' edges
+CHANCE_LIKENESS = 0.95  # of the median likeness: they are, if they look less like corners
 FARTHEST_GAP = 8  # columns and rows over which a lattice is looked for beyond what hides it
 
 

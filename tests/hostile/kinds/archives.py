@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import random
-import shutil
 import struct
 import warnings
 import zipfile
@@ -17,6 +16,7 @@ from datasets.store.kept_masters import NOTES, Kept
 from datasets.store.packing import pack_masters
 from datasets.store.zip_archive import END, ENTRY, LARGE_END, LOCAL, LOCATOR
 from datasets.verify import verify
+from tests.hostile.kinds.linear_images import generated_from
 from tests.hostile.running import Call
 from tests.hostile.values import TEXTS, damaged
 from tests.wrong_input import Place
@@ -35,13 +35,7 @@ def make(rng: random.Random, place: Place) -> tuple[str, list[Call]]:
     path = min((root / "masters").glob("*.zip"))
     what = rng.choice((_fields, _fields, _fields, _others, _others, _bytes))(rng, path)
     calls: list[Call] = [("verify", root)] if rng.random() < 0.3 else []
-    if rng.random() < 0.5:
-        for name in ("frames", "detections", "estimates", "scores"):
-            shutil.rmtree(root / name)
-        calls.append(("generate", root / "recipe.toml", "--out", root, "-q"))
-    else:
-        new = ("--out", place.new(), "-q", "--reuse", root, "--regime", "harsh")
-        calls.append(("generate", root / "recipe.toml", *new, *rng.choice(((), ("--pack-masters",)))))
+    calls.append(generated_from(rng, root, place, rng.choice(((), ("--pack-masters",)))))
     if rng.random() < 0.3:
         calls += [("repair", root, "-q"), functools.partial(_is_sound, root)]
     return what, calls

@@ -23,15 +23,17 @@ def make(rng: random.Random, place: Place) -> tuple[str, list[Call]]:
     path = min((root / "masters").iterdir())
     what = rng.choice((_written, _written, _written, _bytes))(rng, path)
     calls: list[Call] = [("verify", root)] if rng.random() < 0.3 else []
+    return what, [*calls, generated_from(rng, root, place)]
+
+
+def generated_from(rng: random.Random, root: Path, place: Place, options: tuple[str, ...] = ()) -> Call:
+    """The command that develops a dataset's linear images, into it or, with further options, into a new one."""
+    recipe = root / "recipe.toml"
     if rng.random() < 0.5:
         for name in ("frames", "detections", "estimates", "scores"):
             shutil.rmtree(root / name)
-        calls.append(("generate", root / "recipe.toml", "--out", root, "-q"))
-    else:
-        calls.append(
-            ("generate", root / "recipe.toml", "--out", place.new(), "-q", "--reuse", root, "--regime", "harsh")
-        )
-    return what, calls
+        return ("generate", recipe, "--out", root, "-q")
+    return ("generate", recipe, "--out", place.new(), "-q", "--reuse", root, "--regime", "harsh", *options)
 
 
 def _written(rng: random.Random, path: Path) -> str:
