@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import functools
+import json
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from datasets.plan import plan, shard_count
 from datasets.recipe.model import Recipe
+from datasets.store.claim import claim
 from datasets.store.dataset import Dataset
 from pipelines.bench.cases import chosen_poses
 from pipelines.bench.primary_rays import NAME, primary_rays
@@ -48,8 +50,8 @@ def run_stages(recipe: Recipe, poses: list[int], spent: dict[str, list[Times]] |
 
     spent: takes the times of each stage.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        dataset = Dataset(Path(folder), recipe)
+    text = json.dumps(recipe.model_dump(mode="json"))  # what the manifest keeps; nothing reads it again
+    with tempfile.TemporaryDirectory() as folder, claim(Path(folder), recipe, text) as dataset:
 
         def estimate_shard(pose: int) -> None:
             estimate.run_shard(dataset, pose, SETTING)

@@ -1,5 +1,7 @@
 """Benchmarks: the order of timing, the table, the floor's kernel, the command. No test asserts a time."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -67,6 +69,21 @@ def test_the_command_measures_and_writes(cli, tmp_path):
     assert outcome.code == 0
     assert "one render of each camera" in outcome.out  # on the bar; and in the table
     assert (tmp_path / "new" / "bench.md").read_text().count("| render |") == 4  # three cameras and their sum
+
+
+def test_all_stages_are_measured_end_to_end(cli):
+    outcome = cli("bench", "smoke", "--only", "stages", "--poses", 1, "--json")
+    assert outcome.code == 0
+    told = [row["ours"] for row in json.loads(outcome.out)["times"]]
+    assert [
+        next(name for name in ("all", "generate", "detect", "estimate", "score") if name in row) for row in told
+    ] == [
+        "all",
+        "generate",
+        "detect",
+        "estimate",
+        "score",
+    ]
 
 
 @pytest.mark.full
