@@ -71,6 +71,7 @@ def test_the_command_measures_and_writes(cli, tmp_path):
     assert (tmp_path / "new" / "bench.md").read_text().count("| render |") == 4  # three cameras and their sum
 
 
+@pytest.mark.full
 def test_all_stages_are_measured_end_to_end(cli):
     outcome = cli("bench", "smoke", "--only", "stages", "--poses", 1, "--json")
     assert outcome.code == 0
