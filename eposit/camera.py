@@ -127,3 +127,7 @@ def _last_axis(values: ArrayLike, size: int, name: str) -> Array:
     if array.ndim == 0 or array.shape[-1] != size:
         raise ValueError(f"{name} has shape {array.shape}; its last axis must have length {size}")
     return array
+
+
+# The image of bearing vectors, in which distances near a point are angles but for the scale there, 2 / (1 + cos theta).
+BEARINGS = Camera(lens="stereographic", fx=1.0, fy=1.0, cx=0.0, cy=0.0, width=1, height=1)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from eposit.arrays import Array
 from eposit.compiled.layout import LINEAR_RESULT
 from eposit.pose import Pose
-from eposit.problem import Problem, inverse_covariances, workspace
+from eposit.problem import Problem, inverse_covariances
 from eposit.results import solve_batch
 from eposit.solution import Solution
+from eposit.workspace import readable
 
 
 def to_minimum(problem: Problem, start: Pose) -> Solution:
@@ -17,15 +17,15 @@ def to_minimum(problem: Problem, start: Pose) -> Solution:
     from eposit.compiled.machine_code import native
     from eposit.compiled.refine import refine_poses
 
-    n, w = len(problem.points_in_obj), workspace(problem.camera, len(problem.points_in_obj))
+    n, call = len(problem.points_in_obj), native(refine_poses)
     obj, weights = np.ascontiguousarray(problem.points_in_obj), inverse_covariances(problem.weights)
     pixels = np.ascontiguousarray(problem.points_px)
     starts = np.ascontiguousarray(np.hstack((start.R.reshape(-1, 9), start.t)))  # hstack keeps the order of a transpose
 
-    def run(out: Array, first: int, stop: int) -> None:
-        native(refine_poses)(
-            w.ctypes.data, n, obj.ctypes.data, pixels.ctypes.data, weights.ctypes.data, n, len(pixels), first, stop,
-            starts.ctypes.data, out.ctypes.data,
-        )  # fmt: skip
+    given = [readable(values) for values in (obj, pixels, weights)]
+    begin = readable(starts)
 
-    return solve_batch(run, (len(pixels), n), LINEAR_RESULT, 1.0)
+    def run(w: int, out: int, first: int, stop: int) -> None:
+        call(w, n, *given, n, len(pixels), first, stop, begin, out)
+
+    return solve_batch(run, problem.camera, (len(pixels), n), LINEAR_RESULT, 1.0)

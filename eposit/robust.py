@@ -10,8 +10,8 @@ import numpy as np
 from eposit.arrays import Array, Mask
 from eposit.camera import Camera
 from eposit.chi_square import chi_square_limit
-from eposit.problem import workspace
 from eposit.solution import Solution, Status, in_order, join, without_pose
+from eposit.workspace import give_back, lend, readable
 
 LEAST_POINTS = 8  # two may be exchanged: of the six others three give a pose, and three confirm it
 
@@ -44,11 +44,14 @@ def solve_robust(
             "the others give a pose and three confirm it: give more points or leave robust out"
         )
     kept = KEPT if n <= FEW else 1
-    w, there, sums = workspace(camera, n), np.zeros((len(pixels), kept, n)), np.empty((len(pixels), kept, 2))
-    native(find_inliers)(
-        w.ctypes.data, n, obj.ctypes.data, pixels.ctypes.data, weights.ctypes.data, len(weights), len(pixels),
-        variance, kept, there.ctypes.data, sums.ctypes.data,
-    )  # fmt: skip
+    workspace, there, sums = lend(camera, n), np.zeros((len(pixels), kept, n)), np.empty((len(pixels), kept, 2))
+    try:
+        native(find_inliers)(
+            workspace.address, n, readable(obj), readable(pixels), readable(weights), len(weights), len(pixels),
+            variance, kept, there.ctypes.data, sums.ctypes.data,
+        )  # fmt: skip
+    finally:
+        give_back(workspace)
     inliers, rivalled = _likeliest(there == 1.0, sums, variance)
     kinds, which = np.unique(inliers, axis=0, return_inverse=True)
     rows = [np.flatnonzero(which.reshape(-1) == i) for i in range(len(kinds))]

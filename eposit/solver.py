@@ -9,15 +9,17 @@ from eposit.arrays import Array, Mask, as_numbers, shown
 from eposit.camera import Camera
 from eposit.chi_square import chi_square_limit
 from eposit.compiled.layout import LINEAR_RESULT, RESULT
-from eposit.problem import as_bearings, as_camera, as_object, as_pixels, as_weights, workspace
+from eposit.problem import as_bearings, as_camera, as_object, as_pixels, as_weights
 from eposit.results import solve_batch, solve_one
 from eposit.robust import solve_robust
 from eposit.solution import Solution
+from eposit.workspace import readable
 
 METHODS = ("best", "centred", "eposit", "posit")
 LINEAR = {"posit": 0, "eposit": 1, "centred": 2}
 DECISIVE = 2.0 * np.log(100.0)  # -2 log of the likelihood ratio of two minima from which the data decide: 100 to 1
 MOST_ITERATIONS = 1_000_000  # a call cannot be interrupted
+TRUTHS, NUMBERS, WHOLES = (bool, np.bool_), (float, int, np.number), (int, np.integer)  # types of options
 BENT = np.log(1.5)  # |log| of cost over parabola at three standard deviations from which the covariance is unreliable
 
 
@@ -107,11 +109,11 @@ def _check(
     if not isinstance(method, str) or method not in METHODS:
         raise ValueError(f"unknown method {shown(method)}; known methods are {', '.join(METHODS)}")
     for name, value in (("refine", refine), ("robust", robust)):
-        if not isinstance(value, bool | np.bool_):
+        if not isinstance(value, TRUTHS):
             raise ValueError(f"{name} is a {type(value).__name__}; it must be True or False")
-    if not (isinstance(tol, float | int | np.number) and 0.0 <= tol < np.inf):
+    if not (isinstance(tol, NUMBERS) and 0.0 <= tol < np.inf):
         raise ValueError(f"tol is {shown(tol)}; it must be a number from 0")
-    if not (isinstance(max_iterations, int | np.integer) and 1 <= max_iterations <= MOST_ITERATIONS):
+    if not (isinstance(max_iterations, WHOLES) and 1 <= max_iterations <= MOST_ITERATIONS):
         raise ValueError(
             f"max_iterations is {shown(max_iterations)}; it must be a whole number from 1 to {MOST_ITERATIONS}"
         )
@@ -130,16 +132,18 @@ def _best(
     from eposit.compiled.best import solve_best
     from eposit.compiled.machine_code import native
 
-    n, w = len(obj), workspace(camera, len(obj))
+    n, call = len(obj), native(solve_best)
     most = variance * chi_square_limit(2.0 * n - 6.0) if variance > 0.0 and n > 3 else np.inf
 
-    def run(out: Array, first: int, stop: int) -> None:
-        native(solve_best)(
-            w.ctypes.data, n, obj.ctypes.data, pixels.ctypes.data, weights.ctypes.data, len(weights), len(pixels),
-            first, stop, variance, refine, DECISIVE, BENT, most, out.ctypes.data,
+    points, images, certainty = readable(obj), readable(pixels), readable(weights)
+
+    def run(w: int, out: int, first: int, stop: int) -> None:
+        call(
+            w, n, points, images, certainty, len(weights), len(pixels), first, stop, variance, refine, DECISIVE, BENT,
+            most, out,
         )  # fmt: skip
 
-    return (solve_one if single else solve_batch)(run, pixels.shape[:2], RESULT, variance or 1.0)
+    return (solve_one if single else solve_batch)(run, camera, pixels.shape[:2], RESULT, variance or 1.0)
 
 
 def _linear(
@@ -155,16 +159,16 @@ def _linear(
     from eposit.compiled.linear import solve_linear
     from eposit.compiled.machine_code import native
 
-    n, w = len(obj), workspace(camera, len(obj))
+    n, call = len(obj), native(solve_linear)
+    points, images = readable(obj), readable(pixels)
     shift_x = shift_y = 0.0
     if theta_centre is not None:
         shift_x = (theta_centre[0] - camera.cx) / camera.fx
         shift_y = (theta_centre[1] - camera.cy) / camera.fy
 
-    def run(out: Array, first: int, stop: int) -> None:
-        native(solve_linear)(
-            w.ctypes.data, n, obj.ctypes.data, pixels.ctypes.data, len(pixels), first, stop, method, tol,
-            max_iterations, shift_x, shift_y, out.ctypes.data,
+    def run(w: int, out: int, first: int, stop: int) -> None:
+        call(
+            w, n, points, images, len(pixels), first, stop, method, tol, max_iterations, shift_x, shift_y, out
         )  # fmt: skip
 
-    return (solve_one if single else solve_batch)(run, pixels.shape[:2], LINEAR_RESULT, 1.0)
+    return (solve_one if single else solve_batch)(run, camera, pixels.shape[:2], LINEAR_RESULT, 1.0)

@@ -9,7 +9,8 @@ import numpy as np
 from eposit import Camera, Pose
 from eposit.compiled import layout
 from eposit.compiled.machine_code import native
-from eposit.problem import as_weights, workspace
+from eposit.problem import as_weights
+from eposit.workspace import Workspace
 
 POSE = layout.STARTS  # place of a pose under test
 
@@ -24,7 +25,9 @@ def problem(camera: Camera, points: np.ndarray, pixels: np.ndarray, sigma_px: An
     from eposit.compiled.shape import describe
 
     n = len(points)
-    w = workspace(camera, n)
+    whole = Workspace(n)
+    whole.write(camera)
+    w = whole.numbers
 
     def rows(place: int, width: int) -> np.ndarray:
         start = layout.POINTS + place * n
