@@ -43,6 +43,7 @@ from eposit.compiled.observe import (
 )  # fmt: skip
 from eposit.compiled.search import all_minima
 from eposit.compiled.shape import DESCRIBED, ON_A_LINE, describe
+from eposit.compiled.turning import minima_by_turning
 
 IMAGE_CIRCLE_ALLOWANCE = 0.05  # share of the radius by which noise may lift a point over the image circle
 FLOOR_PX = 1e-6  # RMSE that counts as rounding when costs are compared
@@ -96,8 +97,8 @@ def undecided(w, n, variance, decisive):
     return (2.0 * n - 6.0) * math.log(1.0 + gap / (w[COSTS] + least)) < decisive
 
 
-@compiled(WHOLE, W, WHOLE, WHOLE, POINTER, WHOLE, WHOLE)
-def find_minima(w, n, whole, pixels, row, refine):
+@compiled(WHOLE, W, WHOLE, WHOLE, POINTER, WHOLE, WHOLE, NUMBER)
+def find_minima(w, n, whole, pixels, row, refine, variance):
     """The status of the image `row`; its minima where that is OK, else NaN for the first. whole: from `describe`."""
     state, w[STEPS] = observe(w, n, pixels, row, IMAGE_CIRCLE_ALLOWANCE), 0.0
     if state == OK and whole != DESCRIBED:
@@ -105,6 +106,8 @@ def find_minima(w, n, whole, pixels, row, refine):
     w[KNOWN] = 0.0
     if state == OK:
         w[KNOWN] = all_minima(w, n, refine)
+        if refine == 1:
+            w[KNOWN] = minima_by_turning(w, n, int(w[KNOWN]), variance)
         state = OK if w[KNOWN] > 0.0 else NOT_CONVERGED
     if state != OK:
         no_pose(w, MINIMA)
@@ -131,7 +134,7 @@ def solve_best(w, n, points, pixels, weights, m, b, first, stop, variance, refin
     plain = m == 1 and weights[0] == 1.0 and weights[1] == 0.0 and weights[2] == 1.0
     for row in range(first, stop):
         o = POSE * row
-        state = find_minima(w, n, whole, pixels, row, refine)
+        state = find_minima(w, n, whole, pixels, row, refine, variance)
         known, cost = int(w[KNOWN]), w[COSTS]
         out[o + STATUS], out[o + ITERATIONS], out[o + PRICE] = state, w[STEPS], cost
         write_result(w, out, b, row)

@@ -22,7 +22,7 @@ from eposit.compiled.linear6 import factorise, solve, turn_up
 from eposit.compiled.model import cost_at, derivatives
 
 LOST, MINIMUM, MERGED = 0, 1, 2
-MAX_STEPS = 150  # a long object may need 120: its turn about itself is hardly seen
+MAX_STEPS = 500  # a long object may need 300: its turn about itself is hardly seen
 NEAR = 0.1  # rad and relative translation: from a step below it on the Hessian is the full one
 SLOW = 3  # steps after which it is in any case
 FIRST_DAMPING, LEAST_DAMPING, RAISED_DAMPING = 1e-6, 1e-9, 1e-3
