@@ -35,7 +35,8 @@ MANY, MANY_SOFTNESS = ((0.4, 6), (0.8, 8), (1.2, 10), (1.8, 12), (2.6, 12)), 0.2
 FEWER_STEPS = 30  # of a fit of a large circle with further shadows, for its time
 SPREAD = 0.1  # of the white's grey: light that may come from each direction beyond that of lamp and surroundings
 MUCH_CLIPPED = 0.1  # of the pixels: edges look sharper than they are, and little of the shadow is left to see
-DOUBTFUL = 1.05  # times as much as is left of the residuals with further shadows: the one may be in a wrong place
+DOUBTFUL = 1.05  # times the variance that is left with further shadows: the one may be in a wrong place
+HOPELESS = 3.0  # times its residuals: a start that is so bad after some steps does not become better, of 96 none
 MISSING = 1.2  # likewise: one lamp does not explain them
 AS_GOOD = 1.01, 1.1  # times the residuals of the best, and where much is clipped
 NO_SLOPE, STRAY_SLOPE = 1e-6, 0.02  # of the disc's grey over a radius, times the white's; and where light strays on it
@@ -60,7 +61,9 @@ def fit_in_any_light(patch: Patch, known: Prior, height: float, light: float) ->
     unexplained = _unexplained(plain, patch, known, height, light)
     if unexplained > DOUBTFUL or not _is_possible(plain) or patch.clipped > MUCH_CLIPPED:
         starts = _best_starts(patch, known, height)
-        plain = _best_of([plain, *(fit_disc(patch, replace(known, start=start)) for start in starts)], patch)
+        hopeless = HOPELESS * plain.residual if plain.converged else np.inf
+        others = (fit_disc(patch, replace(known, start=start), STEPS, hopeless) for start in starts)
+        plain = _best_of([plain, *others], patch)
         plain, known = _in_any_form(plain, patch, known)
         unexplained = _unexplained(plain, patch, known, height, light)
     if unexplained <= MISSING or not plain.converged:
@@ -96,9 +99,16 @@ def _is_possible(fit: DiscFit) -> bool:
 
 
 def _unexplained(fit: DiscFit, patch: Patch, known: Prior, height: float, light: float) -> float:
-    """How many times its residuals are those that further shadows would leave, the disc staying where it is."""
-    left = cost_of(*_lit(patch, known, FEW, FEW_SOFTNESS, height, light), fit.values[:SHAPE])
-    return fit.residual * len(patch.grey) / max(left, 1e-12)
+    """How many times its variance is that which further shadows would leave, the disc staying where it is.
+
+    Variance is what is left for each pixel beyond the numbers that are fitted: as many more numbers make the residuals
+    of a small circle a tenth less by fitting its noise.
+    """
+    lit, prior = _lit(patch, known, FEW, FEW_SOFTNESS, height, light)
+    free = max(len(patch.grey) - len(known.mean), 1)
+    freer = max(len(patch.grey) - len(prior.mean), 1)
+    left = cost_of(lit, prior, fit.values[:SHAPE])
+    return fit.residual * len(patch.grey) / free * freer / max(left, 1e-12)
 
 
 def _best_of(fits: list[DiscFit], patch: Patch) -> DiscFit:

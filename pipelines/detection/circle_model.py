@@ -47,6 +47,7 @@ SOFTNESS_LIMITS = (0.01, 0.6)
 BOX = math.sqrt(12.0)  # width of a box over its standard deviation
 ROUNDING = 1.0 / 12.0  # variance of a grey value that was rounded: no picture is better known
 STEPS = 60
+PATIENCE = 10  # steps
 START_NOISE = 4.0  # variance, grey values^2, before any is known
 STOP = 0.5  # step, in standard deviations of what is fitted, at which a fit has converged; it is still made
 
@@ -133,9 +134,10 @@ def _blurred(fine: Array, kernel: Array, finer: int, rows: Places, columns: Plac
     return out
 
 
-def fit_disc(patch: Patch, prior: Prior, steps: int = STEPS) -> DiscFit:
+def fit_disc(patch: Patch, prior: Prior, steps: int = STEPS, hopeless: float = math.inf) -> DiscFit:
     """Fit one disc by Levenberg and Marquardt; the linear numbers are the best ones at each shape.
 
+    hopeless: variance of the residuals, grey values^2, above which it is given up when it has had some steps.
     The loop is NumPy's, what takes time is compiled: a picture has one circle, and Numba needs seconds for a loop.
     """
     values, trial = np.zeros_like(prior.mean), np.zeros_like(prior.mean)
@@ -143,7 +145,9 @@ def fit_disc(patch: Patch, prior: Prior, steps: int = STEPS) -> DiscFit:
     normal, right = np.eye(len(values)), np.zeros(len(values))
     jacobian, best = np.zeros((len(patch.grey), len(values))), np.zeros(len(patch.grey))
     cost, damping, noise = np.inf, 1e-3, START_NOISE
-    for _ in range(steps):
+    for done in range(steps):
+        if done == PATIENCE and best @ best > hopeless * len(best):
+            break
         picture = _draw(patch, trial)
         weigh = noise / prior.spread**2
         trial[SHAPE:] = _best_levels(picture.basis, patch.grey, weigh[SHAPE:], prior.mean[SHAPE:])

@@ -1,5 +1,7 @@
 """The raised circle on pictures by brute force: its projected centre is found, not the centroid of what is seen."""
 
+import math
+
 import cv2
 import numpy as np
 import pytest
@@ -22,7 +24,8 @@ LAMPS = (LAMP, np.array([14.0, -12.0, 20.0]), np.array([-16.0, 6.0, 18.0]))  # o
 AROUND = 0.3  # share of the surroundings in the light
 CELLS = 6  # to a pixel: what a cell jumps over averages out along the rim, 0.002 px are left
 BLUR = 0.7  # px, before the pixels' own area
-EDGE_BLUR = float(np.sqrt(BLUR**2 + 1.0 / 12.0))
+PIXEL = math.sqrt(1.0 / 12.0)  # standard deviation of a pixel's own area
+EDGE_BLUR = math.hypot(BLUR, PIXEL)
 
 # Focal length, px; angles of rotation, degrees; place of the circle's foot in the camera's frame, squares. The disc's
 # radius is 15 px in each; the centroid of its image lies 0.09, 0.28 and 0.75 px off its centre's. In the near view it
@@ -183,9 +186,6 @@ def test_the_light_of_several_lamps_is_in_what_it_states(name):
     for _ in range(5):
         circle = found_in(digitised(image, rng, 1.0), camera)
         normalised.append(np.linalg.cholesky(np.linalg.inv(circle.covariance_px2)).T @ (circle.centre_px - truth))
-    print(
-        name, np.sqrt(np.mean(np.square(normalised))), circle.centre_px - truth, np.sqrt(np.diag(circle.covariance_px2))
-    )
     assert np.sqrt(np.mean(np.square(normalised))) < 2.0
 
 
@@ -222,3 +222,21 @@ def test_a_large_circle_is_read_in_a_bounded_number_of_pixels(drawn, monkeypatch
     found = found_in(large, (R, t, by * f, (centre + 0.5) * by - 0.5), by * EDGE_BLUR).centre_px
     assert np.linalg.norm((found + 0.5) / by - 0.5 - found_in(small, (R, t, f, centre)).centre_px) < 0.05  # 0.031
     assert max(pixels) < 140**2  # a disc of 60 px radius and the blur around it; it is 210 px wide here
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_noise_in_few_pixels_is_not_taken_for_more_lamps(drawn, monkeypatch, seed):
+    """Twenty-two more shadows make the residuals of 450 pixels a twentieth less by fitting their noise."""
+    (image, (R, t, f, centre)), fits = drawn["far"], []
+
+    def counted(patch, *rest):
+        fits.append(len(patch.grey))
+        return fit_disc(patch, *rest)
+
+    monkeypatch.setattr(circle_light, "fit_disc", counted)
+    small = digitised(
+        cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.random.default_rng(seed), 2.0
+    )
+    assert found_in(small, (R, t, 0.5 * f, (centre + 0.5) * 0.5 - 0.5), math.hypot(0.5 * BLUR, PIXEL)) is not None
+    assert len(fits) == 2  # where the board puts it, and looked for around
+    assert max(fits) < 500
