@@ -1,4 +1,4 @@
-"""Run the stress pictures: `python -m tests.stress [--views N] [--only KIND ...]`."""
+"""Run the stress pictures: `python -m tests.stress [--views N] [--first VIEW] [--only KIND ...]`."""
 
 from __future__ import annotations
 
@@ -23,24 +23,27 @@ def main():
     asked, found = children(given.detectors), {}
     try:
         for kind in kinds:
-            found[kind.name] = run_kind(kind, given.views, asked, results)
+            views = range(given.first, given.first + min(given.views, kind.views))
+            found[kind.name] = run_kind(kind, views, asked, results)
             _tell(kind, found[kind.name])
     finally:
         for child in asked.values():
             child.close()
     write_sheet(kinds, results.folder / "tiles", results.folder / "sheet.png")
-    if given.page:
-        write_page(found, Path(given.page))
+    page = given.page or (EVIDENCE if not given.only and given.first == 0 else None)
+    if page:
+        write_page(found, Path(page))
     return int(any(faults(rows) for rows in found.values()))
 
 
 def _arguments():
     parser = argparse.ArgumentParser(prog="python -m tests.stress", description=__doc__)
     parser.add_argument("--views", type=int, default=20, help="pictures of each kind, at most 20")
+    parser.add_argument("--first", type=int, default=0, help="first view; those of the page are 0 to 19")
     parser.add_argument("--only", nargs="+", choices=KINDS, metavar="KIND", help="kinds; all of them without it")
     parser.add_argument("--detectors", nargs="+", choices=DETECTORS, default=DETECTORS, help="ours is always needed")
     parser.add_argument("--out", default=ROOT / "out" / "stress", help="folder of what was found")
-    parser.add_argument("--page", default=EVIDENCE, help="the table, in Markdown; '' for none")
+    parser.add_argument("--page", help="the table, in Markdown; of all kinds from view 0 it is docs/evidence/stress.md")
     return parser.parse_args()
 
 

@@ -19,9 +19,12 @@ def children(detectors=DETECTORS):
 
 
 def run_kind(kind, views, asked, results):
-    """Rows of all detectors by view, those that hold and those that are made now."""
+    """Rows of all detectors by view, those that hold and those that are made now.
+
+    Any whole number is a view. What was kept of others stays.
+    """
     found = {detector: results.rows(kind, detector) for detector in asked}
-    for view in range(min(views, kind.views)):
+    for view in views:
         missing = [detector for detector in asked if view not in found[detector]]
         if not missing:
             continue
@@ -32,4 +35,4 @@ def run_kind(kind, views, asked, results):
             answer, seconds = asked[detector].ask(shot.image, kind.target)
             found[detector][view] = measured(kind, detector, shot, answer, seconds)
             results.keep(kind, detector, found[detector])
-    return found
+    return {detector: {view: rows[view] for view in views} for detector, rows in found.items()}
