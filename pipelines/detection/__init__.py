@@ -14,6 +14,7 @@ from pipelines.detection.board_fit import fit_board
 from pipelines.detection.board_map import grid
 from pipelines.detection.board_size import is_of_another_size
 from pipelines.detection.circle import find_circle, misfit_squares
+from pipelines.detection.circle_blur import motion_blur
 from pipelines.detection.consistency import Corners, check_placed, too_many_bad
 from pipelines.detection.corner_sites import chessboard_sites
 from pipelines.detection.corners import refine_corners
@@ -136,7 +137,8 @@ def _detect_chessboard(image: Grey, target: Chessboard, detector: str, check_tim
     light = decoded(image, corners.exponent)
     if is_of_another_size(light, corners, at, target):
         return _nothing(count, PointStatus.OTHER_BOARD, seen.finder)
-    circle = find_circle(light, corners, target, misfit)
+    motion = motion_blur(light, corners.board, chessboard_sites(target).chosen(ids[corners.consistent]))
+    circle = find_circle(light, corners, target, misfit, motion)
     points, covariance = np.full((count, 2), np.nan), np.full((count, 2, 2), np.nan)
     status = np.full(count, PointStatus.POINT_NOT_FOUND, STATUS_TYPE)
     good = ids[corners.consistent]

@@ -18,6 +18,7 @@ from scipy.optimize import minimize_scalar
 
 from eposit.arrays import Array
 from pipelines.detection.board_map import BoardMap, grid
+from pipelines.detection.circle_blur import Blur, still
 from pipelines.detection.circle_doubt import USUALLY_BEYOND_PX, at_least, beyond_the_fit, unexplained_size
 from pipelines.detection.circle_light import MANY_CELLS, MUCH_CLIPPED, fit_in_any_light
 from pipelines.detection.circle_model import ROUNDING, cost_of, fit_disc
@@ -51,6 +52,7 @@ SIZE_LIMIT = 0.03  # of the size
 LARGE_RADIUS_PX = 30.0  # a larger circle is read in means of pixels that leave its edges this blur:
 LEAST_BLUR_PX = 0.7  # below it the fine grid would sample them badly
 MOST_RADIUS_PX = 150.0  # a larger one is read in means whatever it costs: 0.03 px instead of 0.01, in bounded time
+MOVED_RADIUS_PX, LONG_STREAK_PX = 60.0, 12.0  # likewise where the picture moved: a fit costs four times as much
 LEAST_AXIS = 1.5  # blurs: a disc whose smaller half axis is below this has no edges of its own
 
 
@@ -62,10 +64,12 @@ class Circle:
     covariance_px2: Array  # (2, 2)
 
 
-def find_circle(image: Picture, corners: Corners, target: Chessboard, misfit: float = 0.0) -> Circle | None:
+def find_circle(
+    image: Picture, corners: Corners, target: Chessboard, misfit: float = 0.0, motion: Blur | None = None
+) -> Circle | None:
     """The circle's centre, or None if there is no dark disc where the board puts it.
 
-    misfit: RMS distance of the corners from the board's map, squares.
+    misfit: RMS distance of the corners from the board's map, squares. motion: the blur of a picture that moved.
     """
     board = corners.board
     at, height = target.circle_centre[:2] / target.square_mm, target.circle_height_mm / target.square_mm
@@ -73,14 +77,21 @@ def find_circle(image: Picture, corners: Corners, target: Chessboard, misfit: fl
     axes = np.linalg.svd(board.jacobian(at, height), compute_uv=False) * radius
     if axes[-1] < LEAST_AXIS * corners.blur_px:
         return None
-    harmless = min(math.ceil(axes[0] / LARGE_RADIUS_PX), max(1, int(corners.blur_px / LEAST_BLUR_PX)))
-    by = max(harmless, math.ceil(axes[0] / MOST_RADIUS_PX))
+    by = _pixels_to_one(float(axes[0]), corners.blur_px, motion)
     unsure = _unsure(board, target, image.shape)
     if by == 1:
-        return _Place(image, corners, target, misfit, unsure).circle()
+        return _Place(image, corners, target, misfit, unsure, motion).circle()
     small = replace(corners, board=board.reduced(by), blur_px=corners.blur_px / by, noise=corners.noise / by**2)
-    found = _Place(_means(image, by), small, target, misfit, unsure).circle()
+    found = _Place(_means(image, by), small, target, misfit, unsure, motion and motion.scaled(1.0 / by)).circle()
     return found and Circle((found.centre_px + 0.5) * by - 0.5, found.covariance_px2 * by**2)
+
+
+def _pixels_to_one(radius_px: float, blur_px: float, motion: Blur | None) -> int:
+    """Along each side: how many pixels' mean is read in the place of one, for a circle that is large."""
+    harmless = min(math.ceil(radius_px / LARGE_RADIUS_PX), max(1, int((motion or still(blur_px)).px / LEAST_BLUR_PX)))
+    if motion is None:
+        return max(harmless, math.ceil(radius_px / MOST_RADIUS_PX))
+    return max(harmless, math.ceil(max(radius_px / MOVED_RADIUS_PX, np.linalg.norm(motion.streak) / LONG_STREAK_PX)))
 
 
 def _means(image: Picture, by: int) -> NDArray[np.float32]:
@@ -99,6 +110,7 @@ class _Place:
     target: Chessboard
     misfit: float
     unsure: Array  # (3, 3) covariance of place, squares, and size, as a share, before the circle is looked at
+    motion: Blur | None  # of a picture that moved
 
     @property
     def radius(self) -> float:
@@ -136,12 +148,12 @@ class _Place:
 
     def _best_fit(self) -> DiscFit | None:
         """Of the circle where the board puts it and, if the place is unsure, of one that is looked for around it."""
-        blur_px, doubt = _edge_blur(self.corners), _looked_for(self.unsure)
-        patch = self._patch(blur_px)
+        blur, doubt = self.motion or still(_edge_blur(self.corners)), _looked_for(self.unsure)
+        patch = self._patch(blur)
         if patch is not None and patch.clipped > MUCH_CLIPPED:
-            blur_px *= self._sharpened(blur_px)
-            patch = self._patch(blur_px)
-        around = self._patch(blur_px, doubt) if doubt else None
+            blur = blur.scaled(self._sharpened(blur))
+            patch = self._patch(blur)
+        around = self._patch(blur, doubt) if doubt else None
         near = None if patch is None else self._fit(patch, self._known(patch))
         if around is None:
             return near
@@ -158,8 +170,8 @@ class _Place:
             return far
         return _unless_apart(near, far) if far.converged else near
 
-    def _patch(self, blur_px: float, doubt: float = 0.0) -> Patch | None:
-        return circle_patch(self.image, self.corners.board, self.seen, blur_px, self.target, doubt)
+    def _patch(self, blur: Blur, doubt: float = 0.0) -> Patch | None:
+        return circle_patch(self.image, self.corners.board, self.seen, blur, self.target, doubt)
 
     def _fit(self, patch: Patch, known: Prior) -> DiscFit:
         return fit_in_any_light(patch, known, self.height, self._light(patch))
@@ -169,7 +181,9 @@ class _Place:
 
     @property
     def _beyond(self) -> tuple[float, float]:
-        """Px by which the corners' edges along x and y are wider than those of a gaussian blur; 0 where none tells."""
+        """Px by which the corners' edges along x and y are wider than their blur makes them; 0 where none tells."""
+        if self.motion is not None:
+            return 0.0, 0.0  # it was found from their widths
         along_x, along_y = np.nan_to_num(self.corners.widths_beyond_px)
         return float(along_x), float(along_y)
 
@@ -177,11 +191,11 @@ class _Place:
         """Grey value of the white."""
         return max(self.corners.contrast, float(np.percentile(patch.grey, WHITE_PERCENT)))
 
-    def _sharpened(self, blur_px: float) -> float:
+    def _sharpened(self, blur: Blur) -> float:
         """Share of the blur that a picture has whose edges look sharper because it is clipped: what fits best."""
 
         def left(share: float) -> float:
-            patch = self._patch(share * blur_px)
+            patch = self._patch(blur.scaled(share))
             return np.inf if patch is None else fit_disc(patch, self._known(patch)).residual
 
         looks = np.arange(*SHARPENED)

@@ -2,10 +2,10 @@
 
 On a grid finer than the pixels, the picture is (k + h . x) D + (1 - D) (w + g . x - A b - L s): the disc D with grey k
 and a slope h, as stray light has, over white w with a slope g, of which the disc blocks a share b of the surroundings'
-light, and the lamp's shadow s, a disc of the same size, displaced and with a soft rim. It is blurred by a gaussian and
-sampled at the pixels. k, w, g, h, A and L are linear and solved along; disc and shadow are moved by
-Levenberg-Marquardt. Where there are several lamps or windows, further shadows stand for the light from a dozen or two
-of directions, each with an L of its own.
+light, and the lamp's shadow s, a disc of the same size, displaced and with a soft rim. It is moved along the streak of
+a picture that moved, blurred by a gaussian and sampled at the pixels. k, w, g, h, A and L are linear and solved along;
+disc and shadow are moved by Levenberg-Marquardt. Where there are several lamps or windows, further shadows stand for
+the light from a dozen or two of directions, each with an L of its own.
 
 Where the disc's rim lies in its own shade, no edge can be seen; the model knows that and takes the place from the rest.
 """
@@ -34,9 +34,9 @@ from pipelines.detection.circle_numbers import (
     WHITE_SLOPE,
     DiscFit,
     Patch,
-    Places,
     Prior,
 )
+from pipelines.detection.circle_pixels import at_pixels
 from pipelines.detection.erf import GAUSS, decay, signed_share
 from pipelines.detection.kernels import compiled
 
@@ -108,32 +108,6 @@ def _shadow(u: Array, p: Array) -> tuple[Array, Array]:
     return out, slopes
 
 
-@compiled
-def _blurred(fine: Array, kernel: Array, finer: int, rows: Places, columns: Places) -> Array:
-    """Separable blur of a fine grid (h, w), at the pixels (n,), (n,) of the patch. Beyond its border the grid goes on
-    as it ends."""
-    taps, (height, width) = len(kernel), fine.shape
-    first = (finer - taps) // 2
-    held = np.empty((height // finer, width + 2 * taps))
-    for i in range(held.shape[0]):
-        for j in range(width):
-            held[i, taps + j] = 0.0
-        for k in range(taps):
-            row = finer * i + first + k
-            row = 0 if row < 0 else height - 1 if row >= height else row
-            for j in range(width):
-                held[i, taps + j] += kernel[k] * fine[row, j]
-        for j in range(taps):
-            held[i, j], held[i, taps + width + j] = held[i, taps], held[i, taps + width - 1]
-    out = np.empty(len(rows))
-    for n in range(len(rows)):
-        begin, total = finer * columns[n] + first + taps, 0.0
-        for k in range(taps):
-            total += kernel[k] * held[rows[n], begin + k]
-        out[n] = total
-    return out
-
-
 def fit_disc(patch: Patch, prior: Prior, steps: int = STEPS, hopeless: float = math.inf) -> DiscFit:
     """Fit one disc by Levenberg and Marquardt; the linear numbers are the best ones at each shape.
 
@@ -199,11 +173,11 @@ def _draw(patch: Patch, shape: Array) -> _Picture:
     """The picture at a shape, for each linear number alone."""
     opened, rim = _open_share(patch.on_disc, shape, patch.per_px, patch.finer)
     shade, edge = _shadow(patch.on_board, shape)
-    white = _at_pixels(patch, opened)
+    white = at_pixels(patch, opened)
     under = (patch.slope_x, patch.slope_y, -patch.blocked, -shade, *-patch.shadows)
     slopes, fields = under[:2], [opened * field for field in under]
     fields[2:2] = [(1.0 - opened) * slope for slope in slopes]
-    basis = np.column_stack((1.0 - white, white, *(_at_pixels(patch, field) for field in fields)))
+    basis = np.column_stack((1.0 - white, white, *(at_pixels(patch, field) for field in fields)))
     return _Picture(opened, shade, basis, rim, edge)
 
 
@@ -222,7 +196,7 @@ def _moves(patch: Patch, picture: _Picture, values: Array) -> Array:
     under -= np.tensordot(values[FURTHER:], patch.shadows, 1)
     lamp = -values[LAMP] * picture.opened
     changes = (*(rim * under for rim in picture.rim), *(edge * lamp for edge in picture.edge))
-    return np.column_stack([_at_pixels(patch, change) for change in changes])
+    return np.column_stack([at_pixels(patch, change) for change in changes])
 
 
 def _noise(jacobian: Array, residual: Array) -> float:
@@ -277,17 +251,11 @@ def _rim_doubt(patch: Patch, values: Array, solved: Array) -> Array:
     opened, _ = _open_share(patch.on_disc, values, patch.per_px, patch.finer)
     beyond = np.hypot(*(patch.on_board - values[SHADOW][:, None, None])) - 1.0
     ramp = np.clip(0.5 - beyond / (BOX * values[SOFTNESS]), 0.0, 1.0)
-    return solved @ _at_pixels(patch, values[LAMP] * opened * (ramp - _shadow(patch.on_board, values)[0]))
-
-
-def _at_pixels(patch: Patch, fine: Array) -> Array:
-    """(n,) values of a fine grid (h, w), blurred, at the pixels that take part."""
-    return _blurred(fine, patch.kernel, patch.finer, patch.rows, patch.columns)
+    return solved @ at_pixels(patch, values[LAMP] * opened * (ramp - _shadow(patch.on_board, values)[0]))
 
 
 def prepare() -> None:
     """Call each compiled function once."""
-    places, none = np.ones((2, 1, 1)), np.zeros(0, np.intp)
+    places = np.ones((2, 1, 1))
     _open_share(places, np.ones(SHAPE + LINEAR), np.eye(2), 1)
     _shadow(places, np.ones(SHAPE + LINEAR))
-    _blurred(np.ones((1, 1)), np.ones(1), 1, none, none)

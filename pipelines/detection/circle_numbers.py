@@ -32,7 +32,8 @@ class Patch:
     blocked: Array  # (h, w) share of the surroundings' light that the disc blocks
     shadows: Array  # (m, h, w) share of the light from further directions that the disc hides; m may be 0
     per_px: Array  # (2, 2) radii per px
-    kernel: Array  # (k,) taps of the blur on the fine grid
+    kernel: Array  # (k,) taps of the gaussian blur on the fine grid
+    streak: tuple[Array, Places] | None  # (k,) taps of a motion on it and (k, 2) their columns and rows; None if still
     finer: int  # cells of the fine grid to a pixel, along each side
     clipped: float  # share of the board's pixels that are left out as black or white as a pixel can be
 

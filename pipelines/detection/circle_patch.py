@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from eposit.arrays import Array, Mask
 from pipelines.detection.board_map import BoardMap
-from pipelines.detection.circle_numbers import Patch
+from pipelines.detection.circle_blur import Blur
+from pipelines.detection.circle_numbers import Patch, Places
 from pipelines.detection.finders import Grey
 from pipelines.detection.kernels import compiled
 from render.targets.chessboard import Chessboard
@@ -34,8 +35,27 @@ def _kernel(blur_px: float, finer: int) -> Array:
     return bell / bell.sum()
 
 
+def _streak(blur: Blur, finer: int) -> tuple[Array, Places]:
+    """Taps (k,) of a motion on the fine grid, and their columns and rows (k, 2).
+
+    They stand a deviation of the gaussian apart, whose blur makes them one.
+    """
+    step, cells = max(1, int(blur.px * finer)), blur.streak * finer
+    long = int(np.argmax(np.abs(cells)))
+    half = 0.5 * abs(cells[long]) / step
+    k = np.arange(-math.ceil(half), math.ceil(half) + 1)
+    share = np.clip(0.5 + half - np.abs(k), 0.0, 1.0)
+    aside = step * k * cells[1 - long] / cells[long]  # between two lines
+    line = np.floor(aside)
+    shifts = np.empty((2, len(k), 2), np.intp)
+    shifts[..., long], shifts[..., 1 - long] = step * k, (line, line + 1.0)
+    shares = np.stack((share * (line + 1.0 - aside), share * (aside - line))) / share.sum()
+    used = shares > 0.0
+    return shares[used], shifts[used]
+
+
 def circle_patch(
-    image: Picture, board: BoardMap, seen: tuple[Array, Array], blur_px: float, target: Chessboard, doubt: float
+    image: Picture, board: BoardMap, seen: tuple[Array, Array], blur: Blur, target: Chessboard, doubt: float
 ) -> Patch | None:
     """The pixels around the circle that see it or its white square; None if it reaches out of the image.
 
@@ -46,7 +66,7 @@ def circle_patch(
     radius = target.circle_radius_mm / target.square_mm
     (centre, to_px), foot = seen, board(at)
     from_px = np.linalg.inv(to_px)
-    reach = (1.0 + doubt / radius) * np.linalg.norm(to_px, axis=1) + CLEAR_BLURS * blur_px + BAND_PX
+    reach = (1.0 + doubt / radius) * np.linalg.norm(to_px, axis=1) + CLEAR_BLURS * blur.reach(np.eye(2)) + BAND_PX
     low = np.floor(np.minimum(centre, foot) - reach).astype(int)
     high = np.ceil(np.maximum(centre, foot) + reach).astype(int) + 1
     if np.any(low < 0) or np.any(high > image.shape[::-1]) or np.any(high - low > min(image.shape)):
@@ -59,7 +79,7 @@ def circle_patch(
     blocked = blocked_share(np.hypot(*on_board), 1.0, height / radius)
     shape = (high[1] - low[1], finer, high[0] - low[0], finer)
     squares = (planes[0].reshape(2, *shape)).mean(axis=(2, 4))
-    margin = INK + CLEAR_BLURS * blur_px * radius * np.linalg.norm(from_px, axis=1)
+    margin = INK + CLEAR_BLURS * radius * blur.reach(from_px)
     white = np.empty(squares[0].shape, bool)
     _on_white(squares[0], squares[1], margin, target.columns, target.rows, target.margin_squares, white)
     part = image[low[1] : high[1], low[0] : high[0]].astype(np.float64)
@@ -77,7 +97,8 @@ def circle_patch(
         blocked=blocked,
         shadows=np.empty((0, *blocked.shape)),
         per_px=from_px,
-        kernel=_kernel(blur_px, finer),
+        kernel=_kernel(blur.px, finer),
+        streak=_streak(blur, finer) if blur.streak.any() else None,
         finer=finer,
         clipped=1.0 - len(rows) / np.count_nonzero(white),
     )

@@ -34,6 +34,7 @@ class EdgeProfiles(NamedTuple):
     step_px: Array  # (k,) px between samples
     rises: Mask  # (k,) whether the last end is the bright one
     along_y: Mask  # (k,) whether the edge runs along the board's y axis
+    at: Array  # (k, 2) the corner beside it, squares
 
     def flat(self, values: Array) -> Array:
         """(k,) mean of values (k, s) over both ends, where the edge is not."""
@@ -50,7 +51,7 @@ def measured_blur(image: Picture, board: BoardMap, sites: CornerSites) -> float:
     profiles = edge_profiles(image, board, sites)
     if profiles is None:
         return FALLBACK_PX
-    sigma = float(np.median(_widths(profiles)))
+    sigma = float(np.median(profile_widths(profiles)))
     return float(np.clip(math.sqrt(max(sigma * abs(sigma) - SAMPLING, 0.0)), *LIMITS_PX))
 
 
@@ -63,12 +64,12 @@ def widths_beyond(image: Picture, board: BoardMap, sites: CornerSites, blur_px: 
     profiles = edge_profiles(image, board, sites)
     if profiles is None or profiles.along_y.all() or not profiles.along_y.any():
         return np.full(2, np.nan)
-    widths = _widths(profiles)
+    widths = profile_widths(profiles)
     both = [np.median(widths[profiles.along_y == along]) for along in (False, True)]
     return np.array(both) - math.sqrt(blur_px**2 + SAMPLING)
 
 
-def _widths(profiles: EdgeProfiles) -> Array:
+def profile_widths(profiles: EdgeProfiles) -> Array:
     """(k,) px, standard deviations of a gaussian whose edge has the same integral of q (1 - q)."""
     product = profiles.shares * (1.0 - profiles.shares)
     flat = np.minimum(profiles.flat(product), 0.0)  # noise alone makes it negative
@@ -87,7 +88,8 @@ def edge_profiles(image: Picture, board: BoardMap, sites: CornerSites) -> EdgePr
         return None
     along_y = np.arange(len(step)) >= len(step) // 2
     shares = (profiles[clear] - low[clear, None]) / contrast[clear, None]
-    return EdgeProfiles(shares, step[clear], contrast[clear] > 0.0, along_y[clear])
+    beside = np.tile(at, (len(step) // len(at), 1))[clear]
+    return EdgeProfiles(shares, step[clear], contrast[clear] > 0.0, along_y[clear], beside)
 
 
 def _ends(samples: int) -> int:

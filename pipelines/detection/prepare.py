@@ -13,6 +13,7 @@ from numba.core import event
 from pipelines.detection import (
     circle_model,
     circle_patch,
+    circle_pixels,
     corner_likeness,
     corner_model,
     generic_lens,
@@ -26,7 +27,7 @@ from pipelines.detection import (
 
 MODULES = (  # those with compiled functions; the slowest first
     corner_model, generic_lens, circle_model, saddle_links, saddle_peaks, saddles, corner_likeness,
-    circle_patch, grid_steps, levels, sampling,
+    circle_patch, circle_pixels, grid_steps, levels, sampling,
 )  # fmt: skip
 
 
