@@ -45,6 +45,7 @@ __all__ = ["Detection", "Detector", "PointStatus", "detect_points", "takes_targe
 
 
 OURS = Detector.EDGE_FIT, Detector.BOARD_FIT
+LEAST_PICTURE_PX = 16  # of both sides: the least target, 3 x 3 corners or 4 x 3 discs, has 4 px to a square there
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +80,8 @@ def detect_points(
         raise ValueError(f"detector {str(detector)!r} does not find the target {target.pattern!r}; choose another")
     check_time = TimeLimit(seconds).check
     grey = grey_picture(image)
+    if min(grey.shape) < LEAST_PICTURE_PX:
+        return _nothing(len(target.points), PointStatus.BOARD_NOT_FOUND, "")
     try:
         if isinstance(target, Chessboard):
             return _detect_chessboard(grey, target, detector, check_time)

@@ -17,7 +17,6 @@ from pipelines.detection.textured_region import textured_region
 MOST_PART = 0.5  # of the picture, for its textured region to be looked at before the whole
 FIRST_PIXELS = 7e5  # of the level that is looked at first, at most
 MOST_PIXELS = 6.5e6  # of any
-LEAST_PICTURE_PX = 16
 LEAST_SIDE_PX = 60  # of a level
 ENLARGEMENT, LEAST_ENLARGEMENT, ENLARGED_PIXELS = 3.0, 1.3, 2.5e6
 
@@ -40,9 +39,7 @@ class LevelOf:
 
 
 def levels(image: Grey) -> Iterator[LevelOf]:
-    """The levels of an 8-bit picture (height, width); none of one that is too small for a board."""
-    if min(image.shape) < LEAST_PICTURE_PX:
-        return
+    """The levels of an 8-bit picture (height, width)."""
     region = textured_region(image)
     part, first_px = np.ascontiguousarray(image[region.pixels]), np.array([region.x, region.y], np.float64)
     if part.size < MOST_PART * image.size:

@@ -8,7 +8,11 @@ from pipelines.detection import detect_points
 from pipelines.detection.finders import find_board
 from pipelines.detection.grey_picture import grey_picture
 from pipelines.detection.statuses import PointStatus
+from render.targets.aprilgrid import AprilGrid
+from render.targets.charuco import Charuco
 from render.targets.chessboard import Chessboard
+from render.targets.circle_grid import CircleGrid
+from render.targets.plain_chessboard import PlainChessboard
 from tests.drawn_boards import Drawing
 
 TARGET = Chessboard()
@@ -67,18 +71,39 @@ def test_other_numbers_than_8_bits_are_stretched(usual, kind):
         np.zeros((40, 40), complex),
         np.full((40, 40), np.nan),
         np.zeros((0, 40), np.float32),
+        np.zeros((0, 40), np.uint8),
         np.zeros(40, np.uint8),
     ],
-    ids=["two channels", "64 bits", "complex", "not a number", "empty", "a line"],
+    ids=["two channels", "64 bits", "complex", "not a number", "empty", "empty grey", "a line"],
 )
 def test_an_image_of_another_kind_is_refused(image):
     with pytest.raises(ValueError, match=r"give \(height, width\) or \(height, width, 1, 3 or 4\)"):
         detect_points(image, TARGET)
 
 
-@pytest.mark.parametrize("shape", [(1, 1), (3, 200), (30, 30), (200, 3)])
-def test_a_picture_too_small_for_a_board_has_none(shape):
-    assert set(detect_points(np.zeros(shape, np.uint8), TARGET).status) == {"board_not_found"}
+def test_16_bits_in_the_other_byte_order_are_the_same_picture(usual):
+    """As they come from a file that holds the higher byte first."""
+    image = usual[1].astype(np.uint16) * 13
+    np.testing.assert_array_equal(grey_picture(image.astype(">u2")), grey_picture(image.astype("<u2")))
+
+
+@pytest.mark.parametrize("kind", [np.uint16, np.float32])
+def test_single_pixels_far_beyond_the_others_leave_the_grey_levels_to_these(usual, kind):
+    """A picture of 10 bits with white and black pixels of 16: stretched to these it would have four grey levels."""
+    image = 20000.0 + 4.0 * usual[0]
+    spoiled = image.copy()
+    spoiled[[50, 200, 300], [60, 300, 100]], spoiled[[10, 250], [20, 200]] = 65535.0, 0.0
+    before, after = grey_picture(image.astype(kind)), grey_picture(spoiled.astype(kind))
+    # The medians of 3 x 3 pixels of a board reach within a few levels of its extremes.
+    assert np.median(np.abs(after.astype(int) - before)) <= 3
+    assert set(after[[50, 200, 300], [60, 300, 100]]) == {255}
+    assert set(after[[10, 250], [20, 200]]) == {0}
+
+
+@pytest.mark.parametrize("target", [TARGET, PlainChessboard(), Charuco(), AprilGrid(), CircleGrid()])
+@pytest.mark.parametrize("shape", [(1, 1), (1, 3000), (3000, 2), (3, 200), (30, 30), (200, 3)])
+def test_a_picture_too_small_for_a_board_has_none(shape, target):
+    assert set(detect_points(np.zeros(shape, np.uint8), target).status) == {"board_not_found"}
 
 
 KINDS = {
