@@ -42,7 +42,17 @@ def identify(
         return _by_squares(seen + exchanged, target, axes_px)
     turns = () if _is_own_mirror_image(target) else TURNS
     flipped = [p for turn in turns for p in _placements(turn @ MIRROR, shape, white_first, look, target)]
+    is_shown = any(p.disc == DISC for p in seen + flipped)
+    if not is_shown and _is_negative(shape, white_first, look, target):
+        return PointStatus.OTHER_BOARD
     return _by_circle(seen, flipped)
+
+
+def _is_negative(shape: tuple[int, int], white_first: bool, look: Look, target: Chessboard) -> bool:
+    """Whether black and white are exchanged, by a black margin or by a white disc where the circle would be then."""
+    turns = [*TURNS, *(turn @ MIRROR for turn in TURNS)]
+    other = [p for turn in turns for p in _placements(turn, shape, not white_first, look, target)]
+    return any(p.disc == DISC for p in other) or (any(look.dark_ends) and not any(look.ends))
 
 
 def _by_circle(seen: list[Placement], flipped: list[Placement]) -> Placement | PointStatus:

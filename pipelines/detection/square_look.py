@@ -33,8 +33,9 @@ CLEAR, DISC, UNKNOWN = 0, 1, 2
 class Look:
     """Of a lattice of (rows, columns) points. The square at row 0, column 0 lies before the first point."""
 
-    discs: NDArray[np.int64]  # (rows + 1, columns + 1) CLEAR, DISC or UNKNOWN, which every black square is
+    discs: NDArray[np.int64]  # (rows + 1, columns + 1) CLEAR, DISC or UNKNOWN; of a black square, as to a white disc
     ends: tuple[bool, ...]  # whether the margin is seen on each of the SIDES
+    dark_ends: tuple[bool, ...]  # whether a black one is
 
 
 def look_at_squares(level: Level, board: BoardMap, grid: Grid, radius: float | None, margin: float) -> Look:
@@ -52,8 +53,9 @@ def look_at_squares(level: Level, board: BoardMap, grid: Grid, radius: float | N
     discs = np.full(white.shape, UNKNOWN)
     if radius is not None:
         dark = (levels[1][..., None] - grey) / np.maximum(levels[1] - levels[0], 1e-6)[..., None]
-        discs[white] = _classified(dark[white], radius)
-    return Look(discs, _ends(level, board, white, levels.mean(axis=0), margin))
+        discs = _classified(np.where(white[..., None], dark, 1.0 - dark).reshape(white.size, -1), radius)
+        discs = discs.reshape(white.shape)
+    return Look(discs, *_ends(level, board, white, levels.mean(axis=0), margin))
 
 
 def _levels(grey: Array, white: Mask) -> Array:
@@ -74,9 +76,10 @@ def _levels(grey: Array, white: Mask) -> Array:
 
 
 def _classified(dark: Array, radius: float) -> NDArray[np.int64]:
-    """(n,) what white squares hold, from how dark their places (n, m) are: 0 white, 1 black, NaN out of view.
+    """(n,) what squares hold, from how dark their places (n, m) are: 0 white, 1 black, NaN out of view.
 
-    Of blurred discs the darkness is summed, which is as much as that of sharp ones.
+    Of black squares, from how bright they are. Of blurred discs the darkness is summed, which is as much as that of
+    sharp ones.
     """
     u, v = PLACES.T
     area = float(np.mean(np.hypot(u, v) < radius))
@@ -89,19 +92,23 @@ def _classified(dark: Array, radius: float) -> NDArray[np.int64]:
     return np.where(whole & disc, DISC, np.where(whole & (share < CLEAR_SHARE), CLEAR, UNKNOWN))
 
 
-def _ends(level: Level, board: BoardMap, white: Mask, middle: Array, margin: float) -> tuple[bool, ...]:
-    """On which of the SIDES the squares are the board's last.
+def _ends(
+    level: Level, board: BoardMap, white: Mask, middle: Array, margin: float
+) -> tuple[tuple[bool, ...], tuple[bool, ...]]:
+    """On which of the SIDES the squares are the board's last, and on which those of a board in negative.
 
-    What lies beyond them is white there, beyond white ones, too.
+    What lies beyond them is white there, beyond white ones, too; in negative it is black, beyond black ones, too.
     """
     if margin < LEAST_MARGIN:
-        return (False,) * len(SIDES)
+        return (False,) * len(SIDES), (False,) * len(SIDES)
     beyond = min(BEYOND * margin, MOST_BEYOND)
     places = [_beside(side, white.shape, way) for side in SIDES for way in (-beyond, beyond)]  # within, then beyond
     grey = sample(level, board(np.concatenate(places).reshape(-1, 2))).reshape(-1, len(BESIDE)).mean(axis=1)
     parts = np.split(grey, np.cumsum([len(part) for part in places])[:-1])
     lines = ((slice(None), 0), (slice(None), -1), (0, slice(None)), (-1, slice(None)))  # of the squares on each side
-    return tuple(_is_end(parts[2 * k], parts[2 * k + 1], white[line], middle[line]) for k, line in enumerate(lines))
+    sides = [(parts[2 * k], parts[2 * k + 1], white[line], middle[line]) for k, line in enumerate(lines)]
+    negative = [(-within, -beyond, ~is_white, -half) for within, beyond, is_white, half in sides]
+    return tuple(_is_end(*side) for side in sides), tuple(_is_end(*side) for side in negative)
 
 
 def _beside(side: tuple[int, int], squares: tuple[int, int], way: float) -> Array:

@@ -106,6 +106,18 @@ def test_a_picture_too_small_for_a_board_has_none(shape, target):
     assert set(detect_points(np.zeros(shape, np.uint8), target).status) == {"board_not_found"}
 
 
+@pytest.mark.parametrize("circle", [(1, 2), None])
+def test_a_negative_is_no_picture_of_the_board(circle):
+    """With black and white exchanged it looks like the board after half a turn, but for its margin and its circle."""
+    image = 220 - Drawing(**BASE, circle=circle).image()
+    assert set(detect_points(image, TARGET).status) == {"other_board"}
+
+
+def test_a_negative_without_its_margin_is_told_by_its_circle():
+    image = 220 - Drawing(**BASE, margin=0.0).image()
+    assert set(detect_points(image, TARGET).status) == {"other_board"}
+
+
 KINDS = {
     "low contrast": lambda: Drawing(white=60.0, black=54.0, **BASE).image(),
     "overexposed": lambda: Drawing(white=600.0, black=90.0, **BASE).image(),
