@@ -8,7 +8,8 @@ import numpy as np
 
 from eposit.arrays import Array, Mask
 from pipelines.detection.board_map import BoardMap, Hold
-from pipelines.detection.corner_scatter import leverage, scatter_about, scatter_of_neighbours
+from pipelines.detection.corner_scatter import leverage, scatter_about
+from pipelines.detection.lone_errors import stated_errors
 from pipelines.detection.smooth_extension import smooth_extension
 
 LIMIT_PX = 0.5  # largest distance of a corner from the map through the others
@@ -40,15 +41,18 @@ def drop_inconsistent(corners: Corners, at: Array, size: tuple[int, int]) -> Cor
     """Drop the corner farthest from the map through the others until all the rest agree; scale the covariances.
 
     Corners that are fitted to their own pixels lie where these show them, also where the board's map is a little wrong.
-    So the covariances are scaled by what differs from corner to corner.
+    So the covariances are scaled by what differs from corner to corner, and single corners that lie far from the others
+    state that.
     """
     agreed = _agreeing(corners, at, size)
     good = agreed.consistent
     if not np.any(good):
         return agreed
     parts = (at, agreed.points_px - agreed.board(at), agreed.covariance_px2, agreed.board.slopes(at))
-    factor = scatter_of_neighbours(*(part[good] for part in parts))
-    return replace(agreed, covariance_px2=agreed.covariance_px2 * factor, scatter=factor)
+    places, missed, covariance, slopes = (part[good] for part in parts)
+    stated = agreed.covariance_px2.copy()
+    stated[good], factor = stated_errors(places, missed, covariance, slopes)
+    return replace(agreed, covariance_px2=stated, scatter=factor)
 
 
 def _agreeing(corners: Corners, at: Array, size: tuple[int, int]) -> Corners:

@@ -23,7 +23,7 @@ def scatter_of_neighbours(at: Array, missed: Array, covariance: Array, slopes: A
 
     at: (n, 2) squares. missed: (n, 2) px from the map. covariance: (n, 2, 2) px^2. slopes: (n, 2, k) of the map.
     """
-    smooth = np.concatenate((slopes, _polynomials(at)), axis=2)
+    smooth = np.concatenate((slopes, polynomials(at)), axis=2)
     square, free = _squares(smooth, missed, covariance)
     if square > free:
         return (square + PRIOR_FREEDOM) / (free + PRIOR_FREEDOM)
@@ -63,7 +63,7 @@ def _squares(slopes: Array, missed: Array, covariance: Array) -> tuple[float, fl
     return float(left @ left), float(len(residuals) - span.shape[1])
 
 
-def _polynomials(at: Array) -> Array:
+def polynomials(at: Array) -> Array:
     """(n, 2, k) both coordinates moved by every product of powers of the places up to a degree."""
     low, high = at.min(axis=0), at.max(axis=0)
     x, y = (2.0 * (at - low) / np.maximum(high - low, 1e-9) - 1.0).T
