@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,10 @@ UNEVEN = 0.2  # darkness that light and noise make on white
 DISC_SHARES = (0.4, 2.2)  # of the disc's area, with its shadow
 DISC_OFF = 0.38  # squares that the middle of the disc may lie from that of the square: it stands above the board
 DISC_SPREAD = 1.7  # of a disc's mean square distance from its middle, which other dark shapes exceed
+DISC_PLACES = np.linspace(-0.6, 0.6, 13)  # squares from a square's middle at which discs are compared with it
+DISC_SIZES = (0.85, 1.0, 1.2)  # of its radius: thin print, and a shadow beside it
+EDGE_TURNS, EDGE_PLACES = 16, np.linspace(-0.36, 0.36, 13)  # of shadows' edges that are compared with it, squares
+STRIPS = (0.1, 0.2, 0.3)  # squares: of narrow shadows, half the width
 BEYOND, MOST_BEYOND = 0.5, 0.25  # of the margin, and squares: how far beyond the last squares is looked for white
 BESIDE = np.array([-0.25, 0.0, 0.25])  # squares along the side
 LEAST_MARGIN = 0.2  # squares: a narrower one is not looked for
@@ -89,7 +94,34 @@ def _classified(dark: Array, radius: float) -> NDArray[np.int64]:
     spread = dark @ (u**2 + v**2) / total - mean_u**2 - mean_v**2
     disc = (share > DISC_SHARES[0]) & (share < DISC_SHARES[1]) & (np.hypot(mean_u, mean_v) < DISC_OFF)
     disc &= spread < DISC_SPREAD * 0.5 * radius**2
+    disc[disc] = _is_nearer_to_disc(dark[disc], radius)
     return np.where(whole & disc, DISC, np.where(whole & (share < CLEAR_SHARE), CLEAR, UNKNOWN))
+
+
+def _is_nearer_to_disc(dark: Array, radius: float) -> Mask:
+    """(n,) whether the places (n, m) of squares are dark as under a disc, rather than as beside a shadow's edge."""
+    even = dark - dark.mean(axis=1)[:, None]
+    discs, edges = (even @ part.T for part in _looks_of(radius))
+    return discs.max(axis=1) > np.abs(edges).max(axis=1)  # of a shadow either side of its edge may be the dark one
+
+
+@lru_cache(maxsize=8)
+def _looks_of(radius: float) -> tuple[Array, Array]:
+    """(k, m) looks of discs, and of the edges of shadows and narrow shadows; each of mean zero and length one."""
+    u, v = PLACES.T
+    y, x = (part.reshape(-1, 1) for part in np.meshgrid(DISC_PLACES, DISC_PLACES))
+    discs = np.concatenate([np.hypot(u - x, v - y) < size * radius for size in DISC_SIZES])
+    turn = np.arange(EDGE_TURNS)[:, None, None] * np.pi / EDGE_TURNS
+    away = (np.cos(turn) * u + np.sin(turn) * v - EDGE_PLACES[:, None]).reshape(-1, len(PLACES))
+    edges = np.concatenate([away > 0.0, *(np.abs(away) < half for half in STRIPS)])
+    return _even(discs), _even(edges)
+
+
+def _even(looks: Mask) -> Array:
+    """Of mean zero and length one, without those that are the same everywhere."""
+    parts = looks[looks.any(axis=1) & ~looks.all(axis=1)].astype(np.float64)
+    parts -= parts.mean(axis=1)[:, None]
+    return parts / np.linalg.norm(parts, axis=1)[:, None]
 
 
 def _ends(
