@@ -15,6 +15,7 @@ from pipelines.detection.consistency import Corners, drop_inconsistent, hold_of
 from pipelines.detection.corner_blur import measured_blur, widths_beyond
 from pipelines.detection.corner_model import fit_corners
 from pipelines.detection.corner_picture import BLUR, CONTRAST, MEAN, SHAPE, SLOPE, CornerTask
+from pipelines.detection.corner_shadow import fit_shadowed, looks_shadowed
 from pipelines.detection.corner_sites import CornerSites
 from pipelines.detection.edge_form_errors import FORM_SHARE, form_errors
 from pipelines.detection.finders import Grey
@@ -35,6 +36,8 @@ BAND_PX, BAND_BLURS = 1.0, 3.0  # to either side of an edge: pixels farther off 
 SHARP_PX = 0.6  # blur below which a pixel's area is no gaussian
 MOST_LOST = 0.5  # of the corners
 LEAST_CONTRAST = 0.2  # of the board's: a corner in a shadow has it, a covered one has not
+PLAIN_NOISE = 4.0  # of the board's median variance: twice the deviation, which no corner's own scatter reaches
+SHADOW_PX, SHADOW_BLURS, FARTHEST_SHADOW_PX = 10.0, 3.5, 30.0  # radius of the window that shows a shadow's edge
 FEW = 24  # corners that hardly tell a map's parameters: they are fitted again from the better map
 MISFIT_NOISE = 4.0  # mean squares of a corner's uncertainty that its distance from a good map may have
 
@@ -45,11 +48,13 @@ class _Pass(NamedTuple):
     steps: int
     must_converge: bool
     reach: float  # squares that the window may reach along the edges; 0 where it is to be small
+    is_shadowed: bool = False  # whether a shadow's edge may cross the corner
 
 
 NEAR = _Pass(steps=8, must_converge=False, reach=0.0)  # enough for a map to start the final one from
 SMALL = _Pass(steps=40, must_converge=True, reach=0.0)  # for corners beside what the final one's model lacks
 FINAL = _Pass(steps=40, must_converge=True, reach=1.0)
+SHADOWED = SMALL._replace(is_shadowed=True)  # for corners that these do not explain
 
 
 def refine_corners(
@@ -67,7 +72,8 @@ def refine_corners(
     at, size = sites.at, (image.shape[1], image.shape[0])
     image = without_hot_pixels(image, board(at), float(np.abs(board.jacobian(at)).max()))
     light = decoded(image, 1.0)
-    corners, shapes = _fit(light, board, sites, _start_shapes(board, at, measured_blur(light, board, sites)), NEAR)
+    starts = _start_shapes(board, at, measured_blur(light, board, sites))
+    corners, shapes, _ = _fit(light, board, sites, starts, NEAR)
     exponent, limits = 0.0, NEAR
     for _ in range(2 if len(at) < FEW else 1):
         check_time()
@@ -81,7 +87,7 @@ def refine_corners(
             if sites.circled is not None:
                 light = without_shade(light, board, sites.circled, corners.blur_px)
         limits = FINAL._replace(reach=_form_reach(corners, board, at))
-        corners, shapes = _fit(light, board, sites, _next_shapes(corners, shapes, board, at), limits)
+        corners, shapes, _ = _fit(light, board, sites, _next_shapes(corners, shapes, board, at), limits)
     corners = replace(corners, exponent=exponent)
     if np.mean(~corners.consistent) <= MOST_LOST:
         corners = replace(corners, board=_next_map(corners, corners.board, at, size))
@@ -100,19 +106,26 @@ def _with_nearby(
 ) -> tuple[CornerSites, Corners]:
     """Corners that no final fit explains, and those that were not seen, fitted to the nearest pixels alone.
 
-    An edge that is no board's, as of a hard shadow, may run through a square and leave its corners free.
+    An edge that is no board's, as of a hard shadow, may run through a square and leave its corners free. Where those
+    pixels, too, show more than noise, the edge may be a shadow's that runs through them, and is fitted with the corner.
     """
     if unseen is not None:
         sites, corners = sites.followed_by(unseen), _with_places_for(corners, len(unseen.at))
-    lost = ~corners.consistent
-    if not np.any(lost):
-        return sites, corners
-    some, board = sites.chosen(lost), corners.board
-    again, shapes = _fit(image, board, some, _start_shapes(board, some.at, corners.blur_px), SMALL, corners.noise)
-    with np.errstate(invalid="ignore"):
-        found = again.consistent & (2.0 * np.abs(shapes[:, CONTRAST]) > LEAST_CONTRAST * corners.contrast)
     points, covariance, good = corners.points_px.copy(), corners.covariance_px2.copy(), corners.consistent.copy()
-    points[lost], covariance[lost], good[lost] = again.points_px, again.covariance_px2, found
+    starts, least = _start_shapes(corners.board, sites.at, corners.blur_px), np.where(good, 0.0, np.inf)
+    for limits in (SMALL, SHADOWED):
+        ids = np.flatnonzero(least > PLAIN_NOISE * corners.noise)
+        if limits.is_shadowed:
+            ids = ids[looks_shadowed(image, corners.board, sites.chosen(ids), corners.contrast)]
+        if not len(ids):
+            break
+        again, shapes, noise = _fit(image, corners.board, sites.chosen(ids), starts[ids], limits, corners.noise)
+        with np.errstate(invalid="ignore"):
+            found = again.consistent & (2.0 * np.abs(shapes[:, CONTRAST]) > LEAST_CONTRAST * corners.contrast)
+            found &= noise < least[ids]
+        new = ids[found]
+        points[new], covariance[new], good[new] = again.points_px[found], again.covariance_px2[found], True
+        least[new] = noise[found]
     return sites, replace(corners, points_px=points, covariance_px2=covariance, consistent=good)
 
 
@@ -175,27 +188,31 @@ def _start_shapes(board: BoardMap, at: Array, blur_px: float) -> Array:
 
 def _fit(
     image: Light, board: BoardMap, sites: CornerSites, shapes: Array, limits: _Pass, usual: float | None = None
-) -> tuple[Corners, Array]:
-    """One pass over all corners, and their shapes; consistent is what converged to a corner of the right sense.
+) -> tuple[Corners, Array, Array]:
+    """One pass over all corners, their shapes and noise; consistent is what converged to a corner of the right sense.
 
     usual: noise of the board's other corners, where there are any.
     """
     at = sites.at
     jacobian = board.jacobian(at)
-    task = _task(board, jacobian, sites, shapes, limits.reach)
-    fitted, covariance, noise, converged = fit_corners(image, task, limits.steps, STOP)
+    task = _task(board, jacobian, sites, shapes, limits)
+    if limits.is_shadowed:
+        fitted, covariance, noise, converged = fit_shadowed(image, task, STOP)
+    else:
+        fitted, covariance, noise, converged = fit_corners(image, task, limits.steps, STOP)
     good = _is_corner(fitted, covariance, task.starts, jacobian, sites)
     with np.errstate(invalid="ignore"):
         usual = float(np.nanmedian(noise)) if usual is None and np.any(good) else usual
-        good &= noise <= MOST_NOISE * usual if usual is not None else True
+        most = PLAIN_NOISE if limits.is_shadowed else MOST_NOISE
+        good &= noise <= most * usual if usual is not None else True
     good &= converged if limits.must_converge else True
     points = fitted[:, :2]
     if not np.any(good):
-        return Corners(points, covariance, good, np.nan, np.nan, board), fitted
+        return Corners(points, covariance, good, np.nan, np.nan, board), fitted, noise
     covariance *= _stated_noise(noise, good)[:, None, None]
     blur, contrast = np.median(fitted[good, BLUR]), 2.0 * np.median(np.abs(fitted[good, CONTRAST]))
     typical = float(np.median(noise[good]))
-    return Corners(points, covariance, good, float(blur), float(contrast), board, typical), fitted
+    return Corners(points, covariance, good, float(blur), float(contrast), board, typical), fitted, noise
 
 
 def _stated_noise(noise: Array, good: Mask) -> Array:
@@ -207,15 +224,18 @@ def _stated_noise(noise: Array, good: Mask) -> Array:
     return np.maximum(OWN_NOISE * noise + (1.0 - OWN_NOISE) * np.median(noise[good]), SURE_NOISE * noise)
 
 
-def _task(board: BoardMap, jacobian: Array, sites: CornerSites, shapes: Array, reach: float) -> CornerTask:
+def _task(board: BoardMap, jacobian: Array, sites: CornerSites, shapes: Array, limits: _Pass) -> CornerTask:
     """Where each corner is looked for, and in which pixels: up to the next edges, and not beside the circle."""
     at = sites.at
     lengths = np.linalg.norm(jacobian, axis=1)
     blur = shapes[:, BLUR]
     discs, disc_axes = _covered(board, sites, float(np.median(blur)))
     blurs = CLEAR_BLURS * blur[:, None] / lengths
-    if reach > 0.0:
-        windows = np.clip(min(sites.reach, reach) * lengths.max(axis=1), FINAL_PX, FARTHEST_PX)
+    if limits.is_shadowed:
+        windows = np.clip(SHADOW_BLURS * blur, SHADOW_PX, FARTHEST_SHADOW_PX)
+        bands, sharp = np.full(len(at), np.inf), np.zeros(len(at), bool)
+    elif limits.reach > 0.0:
+        windows = np.clip(min(sites.reach, limits.reach) * lengths.max(axis=1), FINAL_PX, FARTHEST_PX)
         bands, sharp = BAND_PX + BAND_BLURS * blur, blur < SHARP_PX
     else:
         windows = np.maximum(NEAR_PX, NEAR_BLURS * blur)
