@@ -13,9 +13,9 @@ from eposit.arrays import Array
 from pipelines.detection.board_fit import fit_board
 from pipelines.detection.board_map import grid
 from pipelines.detection.board_size import is_of_another_size
-from pipelines.detection.circle import find_circle, misfit_squares
+from pipelines.detection.circle import find_circle
 from pipelines.detection.circle_blur import motion_blur
-from pipelines.detection.consistency import Corners, check_placed, too_many_bad
+from pipelines.detection.consistency import Corners, check_placed, misfit_squares, too_many_bad
 from pipelines.detection.corner_sites import chessboard_sites
 from pipelines.detection.corners import refine_corners
 from pipelines.detection.finders import find_board, find_sector_based, subpix

@@ -52,6 +52,7 @@ SIZE_LIMIT = 0.03  # of the size
 LARGE_RADIUS_PX = 30.0  # a larger circle is read in means of pixels that leave its edges this blur:
 LEAST_BLUR_PX = 0.7  # below it the fine grid would sample them badly
 MOST_RADIUS_PX = 150.0  # a larger one is read in means whatever it costs: 0.03 px instead of 0.01, in bounded time
+MOTION_SHARE = 0.8  # of the residuals of a picture that stood still, below which those of a motion must be
 MOVED_RADIUS_PX, LONG_STREAK_PX = 60.0, 12.0  # likewise where the picture moved: a fit costs four times as much
 LEAST_AXIS = 1.5  # blurs: a disc whose smaller half axis is below this has no edges of its own
 
@@ -79,11 +80,24 @@ def find_circle(
         return None
     by = _pixels_to_one(float(axes[0]), corners.blur_px, motion)
     unsure = _unsure(board, target, image.shape)
-    if by == 1:
-        return _Place(image, corners, target, misfit, unsure, motion).circle()
-    small = replace(corners, board=board.reduced(by), blur_px=corners.blur_px / by, noise=corners.noise / by**2)
-    found = _Place(_means(image, by), small, target, misfit, unsure, motion and motion.scaled(1.0 / by)).circle()
+    if by > 1:
+        image, motion = _means(image, by), motion and motion.scaled(1.0 / by)
+        corners = replace(corners, board=board.reduced(by), blur_px=corners.blur_px / by, noise=corners.noise / by**2)
+    place = _Place(image, corners, target, misfit, unsure, None)
+    if motion is not None:
+        place = _likelier(place, replace(place, motion=motion))
+    found = place.circle()
     return found and Circle((found.centre_px + 0.5) * by - 0.5, found.covariance_px2 * by**2)
+
+
+def _likelier(still: _Place, moved: _Place) -> _Place:
+    """Of two blurs that of a picture that stood still, unless the circle shows the motion, too.
+
+    Lamps that flicker, reflections and noise can make the corners look as if they had moved.
+    """
+    if moved.fit is None or not moved.fit.converged:
+        return still
+    return moved if still.fit is None or moved.fit.residual < MOTION_SHARE * still.fit.residual else still
 
 
 def _pixels_to_one(radius_px: float, blur_px: float, motion: Blur | None) -> int:
@@ -130,7 +144,7 @@ class _Place:
 
     def circle(self) -> Circle | None:
         """The circle, if it is here."""
-        fit = self._best_fit()
+        fit = self.fit
         left = np.nan if fit is None else fit.residual / max(self.corners.noise, ROUNDING)
         if fit is None or not fit.converged or abs(fit.values[SIZE] - 1.0) > SIZE_LIMIT or left > MOST_LEFT:
             return None
@@ -146,7 +160,8 @@ class _Place:
         odd = unexplained_size(size, sure, max(map(abs, self._beyond)) / radius_px)
         return Circle(centre + to_px @ shift, at_least(covariance, odd * (to_px @ fit.with_size)))
 
-    def _best_fit(self) -> DiscFit | None:
+    @cached_property
+    def fit(self) -> DiscFit | None:
         """Of the circle where the board puts it and, if the place is unsure, of one that is looked for around it."""
         blur, doubt = self.motion or still(_edge_blur(self.corners)), _looked_for(self.unsure)
         patch = self._patch(blur)
@@ -218,23 +233,6 @@ def _edge_blur(corners: Corners) -> float:
         return corners.blur_px
     width = math.sqrt(corners.blur_px**2 + SAMPLING) + beyond
     return min(corners.blur_px, math.sqrt(max(width**2 - SAMPLING, LIMITS_PX[0] ** 2)))
-
-
-def misfit_squares(corners: Corners, at: Array) -> float:
-    """By how much, RMS squares, the board's map misses the corners at places (n, 2) beyond their noise.
-
-    What a map leaves out is much the same for neighbours, whose noise is not: it is the mean product of their misses.
-    """
-    low = np.rint(at.min(axis=0)).astype(int)
-    columns, rows = (np.rint(at).astype(int) - low).T
-    side = np.sqrt(np.abs(np.linalg.det(corners.board.jacobian(at))))
-    missed = np.full((rows.max() + 1, columns.max() + 1, 2), np.nan)
-    misses = (corners.points_px - corners.board(at)) / side[:, None]
-    missed[rows, columns] = np.where(corners.consistent[:, None], misses, np.nan)
-    products = [missed[1:] * missed[:-1], missed[:, 1:] * missed[:, :-1]]
-    both = np.concatenate([product.ravel() for product in products])
-    both = both[np.isfinite(both)]
-    return float(np.sqrt(max(2.0 * both.mean(), 0.0))) if len(both) else 0.0
 
 
 def _unsure(board: BoardMap, target: Chessboard, shape: tuple[int, int]) -> Array:

@@ -159,3 +159,20 @@ def _left_out(points: Array, board: BoardMap, at: Array, weights: Array) -> tupl
     own = leverage(scaled).reshape(-1, 2).max(axis=1)
     left = np.maximum(1.0 - own, 1e-3)
     return np.linalg.norm(points - board(at), axis=1) / left, 1.0 / np.sqrt(left)
+
+
+def misfit_squares(corners: Corners, at: Array) -> float:
+    """By how much, RMS squares, the board's map misses the corners at places (n, 2) beyond their noise.
+
+    What a map leaves out is much the same for neighbours, whose noise is not: it is the mean product of their misses.
+    """
+    low = np.rint(at.min(axis=0)).astype(int)
+    columns, rows = (np.rint(at).astype(int) - low).T
+    side = np.sqrt(np.abs(np.linalg.det(corners.board.jacobian(at))))
+    missed = np.full((rows.max() + 1, columns.max() + 1, 2), np.nan)
+    misses = (corners.points_px - corners.board(at)) / side[:, None]
+    missed[rows, columns] = np.where(corners.consistent[:, None], misses, np.nan)
+    products = [missed[1:] * missed[:-1], missed[:, 1:] * missed[:, :-1]]
+    both = np.concatenate([product.ravel() for product in products])
+    both = both[np.isfinite(both)]
+    return float(np.sqrt(max(2.0 * both.mean(), 0.0))) if len(both) else 0.0

@@ -88,6 +88,26 @@ def test_the_circle_is_where_it_was_midway(deg):
     assert off @ np.linalg.solve(found.covariance_px2, off) < 9.0
 
 
+def test_a_motion_that_the_circle_does_not_show_is_left():
+    """Lamps that flicker, reflections and noise make corners look as if the picture had moved."""
+    image, camera = drawing.board_with("far")
+    board, corners = exact_map(camera, image), drawing.project(camera, grid(TARGET.inner), 0.0)
+    told = Corners(
+        corners,
+        np.zeros((len(corners), 2, 2)),
+        np.ones(len(corners), bool),
+        drawing.EDGE_BLUR,
+        drawing.WHITE - drawing.BLACK,
+        board,
+        1.0,
+    )
+    picture = digitised(image, np.random.default_rng(0), 1.0)
+    expected = find_circle(picture, told, drawing.TARGET)
+    found = find_circle(picture, told, drawing.TARGET, motion=Blur(drawing.EDGE_BLUR, way_of(WAYS_DEG[0], 2.5)))
+    np.testing.assert_array_equal(found.centre_px, expected.centre_px)
+    np.testing.assert_array_equal(found.covariance_px2, expected.covariance_px2)
+
+
 def test_a_streak_spreads_light_by_its_own_variance_and_leaves_its_middle():
     streak = np.array([4.0, -2.5])
     point = np.zeros((41, 41))
