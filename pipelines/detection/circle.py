@@ -18,15 +18,14 @@ from scipy.optimize import minimize_scalar
 
 from eposit.arrays import Array
 from pipelines.detection.board_map import BoardMap, grid
-from pipelines.detection.circle_blur import Blur, still
-from pipelines.detection.circle_doubt import USUALLY_BEYOND_PX, at_least, beyond_the_fit, unexplained_size
+from pipelines.detection.circle_blur import Blur, edge_blur, still
+from pipelines.detection.circle_doubt import at_least, beyond_the_fit, unexplained_size
 from pipelines.detection.circle_light import MANY_CELLS, MUCH_CLIPPED, fit_in_any_light
 from pipelines.detection.circle_model import ROUNDING, cost_of, fit_disc
 from pipelines.detection.circle_numbers import DISC_GREY, SHAPE, SIZE, WHITE_GREY, DiscFit, Patch, Prior
 from pipelines.detection.circle_patch import Picture, circle_patch
 from pipelines.detection.circle_prior import MISFIT_SLOPES, known_beforehand
 from pipelines.detection.consistency import Corners
-from pipelines.detection.corner_blur import LIMITS_PX, SAMPLING
 from render.targets.chessboard import Chessboard
 
 WHITE_PERCENT = 95.0  # of the patch's pixels that are no brighter than its white, but for noise
@@ -46,7 +45,6 @@ FEWER_LOOKS = (3, 7)  # likewise a large one
 LOOK_SPREADS = 10.0  # half its axes, in deviations of the prediction: it is far from linear
 GOOD_SHARE = 1.2  # of the residuals of the best fit in the ellipse, up to which a fit from the prediction is kept
 FAR_SPREADS = 3.0  # of the prediction that a circle may lie off, for each that a linear map allows
-PRINT_BEYOND_PX = 0.025  # by which edges are narrower than those of a gaussian blur where it is print that runs
 USUALLY_LEFT, MOST_LEFT = 1.2, 30.0  # times the corners' noise that a fit leaves: no model of a disc explains more
 SIZE_LIMIT = 0.03  # of the size
 LARGE_RADIUS_PX = 30.0  # a larger circle is read in means of pixels that leave its edges this blur:
@@ -95,9 +93,7 @@ def _likelier(still: _Place, moved: _Place) -> _Place:
 
     Lamps that flicker, reflections and noise can make the corners look as if they had moved.
     """
-    if moved.fit is None or not moved.fit.converged:
-        return still
-    return moved if still.fit is None or moved.fit.residual < MOTION_SHARE * still.fit.residual else still
+    return moved if moved.left(moved.blur) < MOTION_SHARE * still.left(still.blur) else still
 
 
 def _pixels_to_one(radius_px: float, blur_px: float, motion: Blur | None) -> int:
@@ -144,7 +140,7 @@ class _Place:
 
     def circle(self) -> Circle | None:
         """The circle, if it is here."""
-        fit = self.fit
+        fit = self._best_fit()
         left = np.nan if fit is None else fit.residual / max(self.corners.noise, ROUNDING)
         if fit is None or not fit.converged or abs(fit.values[SIZE] - 1.0) > SIZE_LIMIT or left > MOST_LEFT:
             return None
@@ -160,10 +156,19 @@ class _Place:
         odd = unexplained_size(size, sure, max(map(abs, self._beyond)) / radius_px)
         return Circle(centre + to_px @ shift, at_least(covariance, odd * (to_px @ fit.with_size)))
 
-    @cached_property
-    def fit(self) -> DiscFit | None:
+    @property
+    def blur(self) -> Blur:
+        """Of the circle's edges."""
+        return self.motion or still(edge_blur(self.corners))
+
+    def left(self, blur: Blur) -> float:
+        """Variance of the residuals, grey values^2, of one fit with a blur."""
+        patch = self._patch(blur)
+        return np.inf if patch is None else fit_disc(patch, self._known(patch)).residual
+
+    def _best_fit(self) -> DiscFit | None:
         """Of the circle where the board puts it and, if the place is unsure, of one that is looked for around it."""
-        blur, doubt = self.motion or still(_edge_blur(self.corners)), _looked_for(self.unsure)
+        blur, doubt = self.blur, _looked_for(self.unsure)
         patch = self._patch(blur)
         if patch is not None and patch.clipped > MUCH_CLIPPED:
             blur = blur.scaled(self._sharpened(blur))
@@ -210,8 +215,7 @@ class _Place:
         """Share of the blur that a picture has whose edges look sharper because it is clipped: what fits best."""
 
         def left(share: float) -> float:
-            patch = self._patch(blur.scaled(share))
-            return np.inf if patch is None else fit_disc(patch, self._known(patch)).residual
+            return self.left(blur.scaled(share))
 
         looks = np.arange(*SHARPENED)
         best = int(np.argmin([left(share) for share in looks]))
@@ -224,15 +228,6 @@ def _unless_apart(fit: DiscFit, other: DiscFit) -> DiscFit:
     apart, covariance = other.values[:2] - fit.values[:2], fit.covariance.copy()
     covariance[:2, :2] += np.outer(apart, apart)
     return replace(fit, covariance=covariance)
-
-
-def _edge_blur(corners: Corners) -> float:
-    """Px. Where black squares grew in print and meet at the corners, these look more blurred than the edges are."""
-    beyond = float(np.mean(corners.widths_beyond_px))
-    if not -USUALLY_BEYOND_PX < beyond < -PRINT_BEYOND_PX:
-        return corners.blur_px
-    width = math.sqrt(corners.blur_px**2 + SAMPLING) + beyond
-    return min(corners.blur_px, math.sqrt(max(width**2 - SAMPLING, LIMITS_PX[0] ** 2)))
 
 
 def _unsure(board: BoardMap, target: Chessboard, shape: tuple[int, int]) -> Array:

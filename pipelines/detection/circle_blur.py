@@ -17,6 +17,8 @@ import numpy as np
 
 from eposit.arrays import Array
 from pipelines.detection.board_map import BoardMap
+from pipelines.detection.circle_doubt import USUALLY_BEYOND_PX
+from pipelines.detection.consistency import Corners
 from pipelines.detection.corner_blur import LIMITS_PX, SAMPLING, Picture, edge_profiles, profile_widths
 from pipelines.detection.corner_sites import CornerSites
 
@@ -27,6 +29,7 @@ BOX = 36.0 / math.pi  # square of a box's width over the variance of a gaussian 
 LEAST_CONTRAST = 0.5  # of the median one: what the squares about a corner must have
 ROUNDS = 6  # of least squares with weights that make it one of absolute distances
 LEAST_VARIANCE = 0.05  # px^2, of an edge
+PRINT_BEYOND_PX = 0.025  # by which edges are narrower than those of a gaussian blur where it is print that runs
 
 
 class Blur(NamedTuple):
@@ -48,6 +51,15 @@ class Blur(NamedTuple):
 def still(blur_px: float) -> Blur:
     """Without motion."""
     return Blur(blur_px, np.zeros(2))
+
+
+def edge_blur(corners: Corners) -> float:
+    """Px. Where black squares grew in print and meet at the corners, these look more blurred than the edges are."""
+    beyond = float(np.mean(corners.widths_beyond_px))
+    if not -USUALLY_BEYOND_PX < beyond < -PRINT_BEYOND_PX:
+        return corners.blur_px
+    width = math.sqrt(corners.blur_px**2 + SAMPLING) + beyond
+    return min(corners.blur_px, math.sqrt(max(width**2 - SAMPLING, LIMITS_PX[0] ** 2)))
 
 
 def motion_blur(image: Picture, board: BoardMap, sites: CornerSites) -> Blur | None:

@@ -82,8 +82,8 @@ def refine_corners(
             return corners
         board = _next_map(corners, board, at, size)
         if not exponent:
-            exponent = measured_exponent(image, board, sites)
-            light = decoded(image, exponent)
+            exponent = measured_exponent(image, light, board, sites)
+            light = decoded(image, exponent) if exponent != 1.0 else light
             if sites.circled is not None:
                 light = without_shade(light, board, sites.circled, corners.blur_px)
         limits = FINAL._replace(reach=_form_reach(corners, board, at))

@@ -40,16 +40,19 @@ def decoded(image: Grey, exponent: float) -> Light:
     return curve.astype(np.float32)[image]
 
 
-def measured_exponent(image: Grey, board: BoardMap, sites: CornerSites) -> float:
-    """The exponent that makes black squares as large as white ones; 1 where they are so, or the larger ones."""
-    before, error = _growth(decoded(image, 1.0), board, sites)
+def measured_exponent(image: Grey, plain: Light, board: BoardMap, sites: CornerSites) -> float:
+    """The exponent that makes black squares as large as white ones; 1 where they are so, or the larger ones.
+
+    plain: the picture's light without a curve, `decoded(image, 1.0)`.
+    """
+    before, error = _growth(plain, board, sites)
     if not before < -SURE * error:
         return 1.0
     for low, high in itertools.pairwise(map(float, EXPONENTS)):
         after = _growth(decoded(image, high), board, sites)[0]
         if after >= 0.0:
             exponent = low + before / (before - after) * (high - low)
-            return exponent if exponent >= LEAST_EXPONENT and _leans(image, exponent, board, sites) else 1.0
+            return exponent if exponent >= LEAST_EXPONENT and _leans(plain, exponent, board, sites) else 1.0
         before = after
     return 1.0
 
@@ -75,10 +78,9 @@ def _median(values: Array) -> tuple[float, float]:
     return middle, spread * float(np.sqrt(0.5 * np.pi / len(values)))
 
 
-def _leans(image: Grey, exponent: float, board: BoardMap, sites: CornerSites) -> bool:
+def _leans(plain: Light, exponent: float, board: BoardMap, sites: CornerSites) -> bool:
     """Whether edges lean as such a curve makes them: the mean of their grey values lies beside the middle one."""
-    light = decoded(image, 1.0)
-    profiles = edge_profiles(light, board, sites)
+    profiles = edge_profiles(plain, board, sites)
     if profiles is None:
         return False
     shares, rows = profiles.shares, np.arange(len(profiles.shares))
@@ -87,5 +89,5 @@ def _leans(image: Grey, exponent: float, board: BoardMap, sites: CornerSites) ->
     halfway = after - (high - 0.5) / np.maximum(high - low, 1e-9)
     mean = shares.shape[1] - 0.5 - np.sum(shares, axis=1)
     lean, error = _median(profiles.step_px * np.where(profiles.rises, mean - halfway, halfway - mean))
-    expected = LEAN * (exponent - 1.0) * measured_blur(light, board, sites)
+    expected = LEAN * (exponent - 1.0) * measured_blur(plain, board, sites)
     return lean + SURE_LEAN * error > LEAST_LEAN * expected
