@@ -17,7 +17,9 @@ from pipelines.detection.sampling import sample
 from pipelines.detection.shadow_picture import BEND, BLUR, LEVELS, OFFSET, SHAPE, SOFT, TURN, Patch, bases
 
 LEAST_PIXELS = 3 * (SHAPE + LEVELS)  # three for each number: fewer would follow anything
-STEPS = 40
+STEPS = 25  # edges of shadows took up to 20
+MOST_TRIED = 6  # corners of a picture, for its time: such a fit takes ten times as long as a plain one
+WHITEST, MOST_WHITE = 254.0, 0.02  # a window in whose pixels so large a share is clipped lies in glare, not in shadow
 STEP_OF_SLOPES = np.array([1e-2, 1e-2, 2e-3, 2e-3, 1e-2, 1e-2, 2e-3, 1e-4, 1e-2])  # of a shape, for its slopes
 MOST_STEP = np.array([*FURTHEST_STEP, 1.0, 0.2, 0.01, 1.0])  # of a shape in one iteration; the levels are linear
 MOST_BEND = 0.02  # 1/px: a shadow's edge of a radius below 25 px is no single curve in a window
@@ -26,6 +28,7 @@ START_SOFT = (0.3, 3.0)  # softness of its light that is tried, blurs
 LEAST_IN_SHADOW = 0.04  # of the contrast in the light: what covers a board has none at all
 ARM, ASIDE = 0.35, 0.2  # squares along and across the four edges of a corner, where black is told from white
 LEAST_ARMS, LEAST_ARM = 3, 0.1  # with so much of the board's contrast: a shadow's edge may run along one of them
+LEAST_SHADE = 0.2  # of the board's contrast, by which the shadow darkens white: less loses no corner
 ARMS = np.array([[ARM, 0.0], [0.0, ARM], [-ARM, 0.0], [0.0, -ARM]])
 
 
@@ -38,15 +41,17 @@ class _State(NamedTuple):
 
 
 def looks_shadowed(image: NDArray[np.float32], board: BoardMap, sites: CornerSites, contrast: float) -> Mask:
-    """(n,) whether there is black beside white on at least three of the four edges that meet in a corner.
+    """(n,) whether there is black beside white on at least three of the four edges that meet in a corner, and white in
+    the light and in the shade.
 
-    Beneath what covers a corner there is no more than two. contrast: of the board, between white and black.
+    Beneath what covers a corner there are no more than two. contrast: of the board, between white and black.
     """
     aside = ASIDE * (ARMS == 0.0)
     places = np.stack([sites.at[:, None] + ARMS + way * aside for way in (1.0, -1.0)])
     grey = sample(image, board(places.reshape(-1, 2))).reshape(2, len(sites.at), len(ARMS))
     rise = (grey[1] - grey[0]) * np.sign(ARMS.sum(axis=1)) * sites.sense[:, None]
-    return np.sum(rise > LEAST_ARM * contrast, axis=1) >= LEAST_ARMS
+    edges, white = np.sum(rise > LEAST_ARM * contrast, axis=1), grey.max(axis=0)
+    return (edges >= LEAST_ARMS) & (np.ptp(white, axis=1) > LEAST_SHADE * contrast)
 
 
 def fit_shadowed(image: NDArray[np.float32], task: CornerTask, stop: float) -> CornerFits:
@@ -55,7 +60,7 @@ def fit_shadowed(image: NDArray[np.float32], task: CornerTask, stop: float) -> C
     Contrasts are those in the light. image: (height, width) light. stop: step, in standard deviations of what is
     fitted, at which it has converged.
     """
-    count = len(task.starts)
+    count, tried = len(task.starts), 0
     fits = CornerFits(
         np.full((count, corner_picture.SHAPE), np.nan),
         np.full((count, 2, 2), np.nan),
@@ -64,8 +69,11 @@ def fit_shadowed(image: NDArray[np.float32], task: CornerTask, stop: float) -> C
     )
     for i in range(count):
         patch = _patch(image, task, i)
-        if len(patch.grey) < LEAST_PIXELS:
+        if len(patch.grey) < LEAST_PIXELS or np.mean(patch.grey > WHITEST) > MOST_WHITE:
             continue
+        tried += 1
+        if tried > MOST_TRIED:
+            break
         try:
             state = _nearest(patch, _start(patch, task.shapes[i]), stop)
             if state is not None and _is_shadow(state):
