@@ -29,7 +29,7 @@ Rings = tuple[tuple[float, int], ...]
 
 # Rings of shadows: heights by which they are displaced, and how many there are. Few tell whether one lamp is enough.
 STARTS = ((0.0, 1), (1.0, 6))  # where the one shadow is looked for if it seems to be in a wrong place
-TRIED, MANY_CELLS = 3, 20000  # of these starts are fitted, and one where the fine grid has more cells, for its time
+TRIED, MANY_CELLS = 3, 16000  # of these starts are fitted, and one where the fine grid has more cells, for its time
 FEW, FEW_SOFTNESS = ((0.5, 6), (1.2, 8), (2.4, 8)), 0.3
 MANY, MANY_SOFTNESS = ((0.4, 6), (0.8, 8), (1.2, 10), (1.8, 12), (2.6, 12)), 0.2
 FEWER_STEPS = 30  # of a fit of a large circle with further shadows, for its time
