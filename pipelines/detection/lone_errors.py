@@ -27,7 +27,7 @@ def stated_errors(at: Array, missed: Array, covariance: Array, slopes: Array) ->
 
     at: (n, 2) squares. missed: (n, 2) px from the map. covariance: (n, 2, 2) px^2. slopes: (n, 2, k) of the map.
     """
-    kept, lone = np.arange(len(at)), np.zeros_like(covariance)
+    kept, lone, factor = np.arange(len(at)), np.zeros_like(covariance), 1.0
     for count in range(int(MOST_SHARE * len(at)) + 1):
         places, misses, own, along = (part[kept] for part in (at, missed, covariance, slopes))
         factor = scatter_of_neighbours(places, misses, own, along)
