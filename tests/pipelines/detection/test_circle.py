@@ -117,13 +117,16 @@ def board_with(name, disc=DISC, moved=0.0, lamps=(LAMP,)):
     return image, camera
 
 
+def exact_corners(image, camera, blur_px=EDGE_BLUR):
+    """The board's corners where they are, known to no error, and their map."""
+    at, points = grid(TARGET.inner), project(camera, grid(TARGET.inner), 0.0)
+    board = BoardMap.fit(at, points, image.shape[::-1], np.ones(len(at)))
+    sure = np.zeros((len(at), 2, 2))
+    return Corners(points, sure, np.ones(len(at), bool), blur_px, WHITE - BLACK, board)
+
+
 def found_in(image, camera, blur_px=EDGE_BLUR):
-    corners = project(camera, grid(TARGET.inner), 0.0)
-    board = BoardMap.fit(grid(TARGET.inner), corners, image.shape[::-1], np.ones(len(corners)))
-    sure = np.zeros((len(corners), 2, 2))
-    return find_circle(
-        image, Corners(corners, sure, np.ones(len(corners), bool), blur_px, WHITE - BLACK, board), TARGET
-    )
+    return find_circle(image, exact_corners(image, camera, blur_px), TARGET)
 
 
 @pytest.fixture(scope="module")

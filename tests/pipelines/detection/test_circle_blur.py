@@ -1,6 +1,7 @@
 """A picture that moved while it was taken: its streak is seen, and the circle is where it was midway."""
 
 import functools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,6 @@ from pipelines.detection.circle import find_circle
 from pipelines.detection.circle_blur import Blur, motion_blur
 from pipelines.detection.circle_patch import _streak
 from pipelines.detection.circle_pixels import _smeared
-from pipelines.detection.consistency import Corners
 from pipelines.detection.corner_sites import chessboard_sites
 from render.targets.chessboard import Chessboard
 from tests.drawn_boards import Drawing
@@ -51,11 +51,6 @@ def seen_motion(image):
     return motion_blur(image, board, chessboard_sites(TARGET))
 
 
-def exact_map(camera, image):
-    at = grid(drawing.TARGET.inner)
-    return BoardMap.fit(at, drawing.project(camera, at, 0.0), image.shape[::-1], np.ones(len(at)))
-
-
 @pytest.mark.parametrize("deg", WAYS_DEG)
 def test_a_motion_is_seen_along_its_direction(deg):
     """What a gaussian says of a box is up to 6 % too much of its length, along the squares' diagonals."""
@@ -73,14 +68,12 @@ def test_a_still_picture_and_one_that_hardly_moved_have_none():
 def test_the_circle_is_where_it_was_midway(deg):
     """With the motion its error is as stated; taken for a blur in all directions it lies 0.5 px off."""
     image, camera = drawing.board_with("far")
-    truth, board = drawing.project(camera, drawing.AT[None], drawing.HEIGHT)[0], exact_map(camera, image)
+    truth, told = (
+        drawing.project(camera, drawing.AT[None], drawing.HEIGHT)[0],
+        replace(drawing.exact_corners(image, camera), noise=1.0),
+    )
     near = slice(int(truth[1]) - 60, int(truth[1]) + 60), slice(int(truth[0]) - 60, int(truth[0]) + 60)
     image[near] = streaked(image[near], deg)
-    corners = drawing.project(camera, grid(TARGET.inner), 0.0)
-    none = np.zeros((len(corners), 2, 2))
-    told = Corners(
-        corners, none, np.ones(len(corners), bool), drawing.EDGE_BLUR, drawing.WHITE - drawing.BLACK, board, 1.0
-    )
     picture = digitised(image, np.random.default_rng(0), 1.0)
     found = find_circle(picture, told, drawing.TARGET, motion=Blur(drawing.EDGE_BLUR, way_of(deg)))
     off = found.centre_px - truth
@@ -91,16 +84,7 @@ def test_the_circle_is_where_it_was_midway(deg):
 def test_a_motion_that_the_circle_does_not_show_is_left():
     """Lamps that flicker, reflections and noise make corners look as if the picture had moved."""
     image, camera = drawing.board_with("far")
-    board, corners = exact_map(camera, image), drawing.project(camera, grid(TARGET.inner), 0.0)
-    told = Corners(
-        corners,
-        np.zeros((len(corners), 2, 2)),
-        np.ones(len(corners), bool),
-        drawing.EDGE_BLUR,
-        drawing.WHITE - drawing.BLACK,
-        board,
-        1.0,
-    )
+    told = replace(drawing.exact_corners(image, camera), noise=1.0)
     picture = digitised(image, np.random.default_rng(0), 1.0)
     expected = find_circle(picture, told, drawing.TARGET)
     found = find_circle(picture, told, drawing.TARGET, motion=Blur(drawing.EDGE_BLUR, way_of(WAYS_DEG[0], 2.5)))

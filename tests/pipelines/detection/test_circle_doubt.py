@@ -12,7 +12,6 @@ from pipelines.detection.board_map import BoardMap, grid
 from pipelines.detection.circle import CORNER_PX, FARTHER, LENS_SPREAD, _unsure, find_circle
 from pipelines.detection.circle_doubt import RESIZED, at_least, beyond_the_fit, unexplained_size
 from pipelines.detection.circle_light import fit_in_any_light
-from pipelines.detection.consistency import Corners
 from tests.pipelines.detection import test_circle as drawing
 from tests.supersampled import digitised
 
@@ -87,16 +86,7 @@ def test_how_sure_the_map_is_of_a_circles_size_is_what_all_maps_like_it_say(name
 def test_a_fit_that_did_not_converge_gives_way_to_one_that_did(monkeypatch):
     """Where the place is unsure, the circle is fitted from the prediction and from the best place around it."""
     image, camera = drawing.board_with("far")
-    corners = drawing.project(camera, grid(drawing.TARGET.inner), 0.0)
-    board = BoardMap.fit(grid(drawing.TARGET.inner), corners, image.shape[::-1], np.ones(len(corners)))
-    told = Corners(
-        corners,
-        np.zeros((len(corners), 2, 2)),
-        np.ones(len(corners), bool),
-        drawing.EDGE_BLUR,
-        drawing.WHITE - drawing.BLACK,
-        board,
-    )
+    told = drawing.exact_corners(image, camera)
     monkeypatch.setattr(circle, "SURE_SHARE", 0.0)
     picture = digitised(image, np.random.default_rng(0), 1.0)
     expected = find_circle(picture, told, drawing.TARGET)

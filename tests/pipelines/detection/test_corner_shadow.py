@@ -3,9 +3,14 @@
 import numpy as np
 import pytest
 
+from pipelines.detection import corner_shadow
+from pipelines.detection.board_map import BoardMap, grid
 from pipelines.detection.corner_picture import BLUR, SHAPE, CornerTask
-from pipelines.detection.corner_shadow import fit_shadowed
+from pipelines.detection.corner_shadow import fit_shadowed, looks_shadowed
+from pipelines.detection.corner_sites import chessboard_sites
 from pipelines.detection.corners import PLAIN_NOISE, STOP
+from render.targets.chessboard import Chessboard
+from tests.drawn_boards import Drawing
 from tests.supersampled import digitised, picture, side
 
 HALF = 15  # of a tile, px
@@ -89,3 +94,30 @@ def test_a_corner_upon_a_shadows_edge_is_where_the_fit_says(name):
 def test_what_covers_a_corner_is_no_shadow(grey):
     for shadow in ("through the corner", "beside it"):
         assert not np.any(fitted(SHADOWS[shadow], noise=1.0, cover=grey)[0].converged)
+
+
+def test_no_more_corners_are_tried_than_there_is_time_for(monkeypatch):
+    monkeypatch.setattr(corner_shadow, "MOST_TRIED", 2)
+    assert np.sum(fitted(SHADOWS["through the corner"], noise=1.0)[0].converged) == 2
+
+
+def test_clipped_pixels_are_glare_and_no_shadow(monkeypatch):
+    monkeypatch.setattr(corner_shadow, "WHITEST", MEAN + 0.5 * CONTRAST)
+    assert not np.any(fitted(SHADOWS["through the corner"], noise=1.0)[0].converged)
+
+
+def test_a_corner_looks_shadowed_beside_lit_and_shaded_white_only():
+    drawing = Drawing(width=520, height=400, focal_px=260.0, angles_deg=(20.0, -15.0, 10.0))
+    target, corners = Chessboard(), drawing.truth()[:-1]
+    image = np.float32(drawing.linear())
+    board = BoardMap.fit(grid(target.inner), corners, image.shape[::-1], np.ones(len(corners)))
+    sites, contrast = chessboard_sites(target), np.ptp(image)
+    apart = np.linalg.norm(corners - drawing.truth()[-1], axis=1) > 30.0  # px, from the circle, which is dark on white
+    assert not np.any(looks_shadowed(image, board, sites, contrast)[apart])
+    edge = round(np.sort(corners[:, 0])[len(corners) // 2])  # through one of them
+    image[:, edge:] *= IN_SHADOW
+    away = np.abs(corners[:, 0] - edge)  # px; squares are some 20 px wide
+    found = looks_shadowed(image, board, sites, contrast)
+    assert np.all(found[away < 2.0])
+    assert np.sum(away < 2.0) > 0
+    assert not np.any(found[(away > 20.0) & apart])
