@@ -37,6 +37,8 @@ nightly: $(SETUP)  ## two small nights, the first accepted as the second's basel
 # Two threads of OpenBLAS in each of pytest's two processes wait for each other on two cores, and busily: tests of small
 # matrices take up to seven times the processor time.
 test test-full stress: export OPENBLAS_NUM_THREADS := 1
+# Where Python may not keep what it compiles, each process compiles every module again; tests start hundreds of processes.
+test test-full stress: export PYTHONDONTWRITEBYTECODE :=
 
 test: $(SETUP)  ## the tests that need pip only, under 6 minutes on 2 cores
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not full and not slow"

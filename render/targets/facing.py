@@ -17,6 +17,8 @@ def shows_front(target: Target, camera_in_obj: Array) -> bool:
     """
     if camera_in_obj[2] >= target.front_mm:
         return False
+    if target.sheet.sag_mm == 0.0:
+        return True
     x0, x1, y0, y1 = target.sheet.extent_mm
     x, y = np.meshgrid(np.linspace(x0, x1, PLACES), np.linspace(y0, y1, PLACES))
     at = np.stack((x, y), axis=-1)

@@ -127,7 +127,7 @@ def test_more_points_are_used():
 
 @pytest.mark.parametrize(
     ("n", "short"),
-    [(5, True), (8, False), *(pytest.param(*case, marks=pytest.mark.full) for case in ((5, False), (8, True)))],
+    [(5, True), *(pytest.param(*case, marks=pytest.mark.full) for case in ((5, False), (8, True), (8, False)))],
 )
 def test_what_is_called_ok_has_arrived(n, short, monkeypatch):
     """Any limit of steps leaves some images on their way, and their status says so. The others are at a minimum, and
