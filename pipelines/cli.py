@@ -58,8 +58,8 @@ NIGHTLY_COMMANDS: tuple[tuple[Callable[..., None], str], ...] = (
 NIGHTLY_HELP = "Accuracy every night: compared with a frozen baseline, kept, shown, and judged by the exit code."
 
 
-def command_line() -> typer.Typer:
-    """The commands as one application."""
+def command_line() -> typer.core.TyperGroup:
+    """The commands as one application, built once."""
     app = typer.Typer(
         name="pipelines",
         help=ABOUT,
@@ -73,7 +73,7 @@ def command_line() -> typer.Typer:
     nights = typer.Typer(help=NIGHTLY_HELP, no_args_is_help=True, rich_markup_mode=None)
     _add(nights, NIGHTLY_COMMANDS)
     app.add_typer(nights, name="nightly", epilog=EXAMPLE.format(NIGHTLY_COMMANDS[0][1]))
-    return app
+    return typer.main.get_group(app)
 
 
 def _add(app: typer.Typer, commands: tuple[tuple[Callable[..., None], str], ...]) -> None:
@@ -84,9 +84,9 @@ def _add(app: typer.Typer, commands: tuple[tuple[Callable[..., None], str], ...]
 def all_commands() -> dict[str, typer.core.TyperCommand]:
     """Every command by its name; those of a group by both names."""
     found: dict[str, typer.core.TyperCommand] = {}
-    for name, command in typer.main.get_command(app).commands.items():  # pyright: ignore[reportAttributeAccessIssue]
+    for name, command in app.commands.items():
         own = getattr(command, "commands", {})
-        found |= {f"{name} {inner}": item for inner, item in own.items()} or {name: command}
+        found |= {f"{name} {inner}": item for inner, item in own.items()} or {name: command}  # pyright: ignore[reportAssignmentType]
     return found
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import functools
 import importlib.metadata
 import os
 import platform
@@ -73,6 +74,7 @@ def blas() -> str:
     return ", ".join(sorted(found)) or "unknown"
 
 
+@functools.cache
 def version_of(library: str) -> str | None:
     """A library's version, None if it is not installed."""
     try:

@@ -9,6 +9,7 @@ Source:
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -53,9 +54,14 @@ def stored_columns(path: Path) -> list[StoredColumn]:
             raise FooterError("its end is not that of a Parquet file")
         file.seek(size - TAIL - length)
         data = file.read(length)
+    return list(_columns(data))
+
+
+@functools.lru_cache(maxsize=128)  # stages that follow each other read the same shards
+def _columns(data: bytes) -> tuple[StoredColumn, ...]:
     try:
         groups = _Compact(data).struct(0)[ROW_GROUPS]
-        return [_column(chunk[META_DATA]) for group in groups for chunk in group[COLUMNS]]
+        return tuple(_column(chunk[META_DATA]) for group in groups for chunk in group[COLUMNS])
     except (IndexError, KeyError, TypeError, AttributeError, UnicodeDecodeError) as error:
         raise FooterError("its footer is damaged") from error
 
@@ -116,7 +122,10 @@ class _Compact:
         return self._data[self._at - count : self._at]
 
     def _unsigned(self) -> int:
-        value = shift = 0
+        value = self._byte()
+        if value < 128:
+            return value
+        value, shift = value & 127, 7
         while True:
             byte = self._byte()
             value |= (byte & 127) << shift

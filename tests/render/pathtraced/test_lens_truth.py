@@ -14,7 +14,7 @@ from render.pathtraced.fisheye import sensor_dict
 from render.targets.image_region import Region
 from tests.cameras import COEFFICIENTS, RADIUS
 
-WIDTH, HEIGHT, SAMPLES = 800, 600, 256
+WIDTH, HEIGHT, SAMPLES = 800, 600, 64
 DIRECTIONS, DOT_PX, DISTANCE_MM = 12, 4.0, 1000.0
 CENTRE = (403.3, 296.8)
 RINGS_DEG = {"perspective": (30.0, 70.0), "pinhole_radial": (12.0, 45.0)}
