@@ -1,5 +1,5 @@
 """All kinds, by name."""
 
-from tests.stress.kinds import boards, cameras, light, optics, pictures
+from tests.stress.kinds import boards, cameras, light, optics, pictures, several
 
-KINDS = {kind.name: kind for module in (optics, light, cameras, pictures, boards) for kind in module.KINDS}
+KINDS = {kind.name: kind for module in (optics, light, cameras, several, pictures, boards) for kind in module.KINDS}
