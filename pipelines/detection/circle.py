@@ -197,7 +197,8 @@ class _Place:
         return fit_in_any_light(patch, known, self.height, self._light(patch))
 
     def _known(self, patch: Patch) -> Prior:
-        return known_beforehand(self._light(patch), self.height, self.misfit, max(map(abs, self._beyond)))
+        light, beyond = self._light(patch), max(map(abs, self._beyond))
+        return known_beforehand(light, self.height, self.misfit, beyond, self.corners.scatter)
 
     @property
     def _beyond(self) -> tuple[float, float]:

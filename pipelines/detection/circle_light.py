@@ -24,6 +24,7 @@ from pipelines.detection.circle_numbers import (
     Patch,
     Prior,
 )
+from pipelines.detection.circle_scatter import confirmed
 
 Rings = tuple[tuple[float, int], ...]
 
@@ -38,7 +39,7 @@ MUCH_CLIPPED = 0.1  # of the pixels: edges look sharper than they are, and littl
 DOUBTFUL = 1.05  # times the variance that is left with further shadows: the one may be in a wrong place
 HOPELESS = 3.0  # times its residuals: a start that is so bad after some steps does not become better, of 96 none
 MISSING = 1.2  # likewise: one lamp does not explain them
-AS_GOOD = 1.01, 1.1  # times the residuals of the best, and where much is clipped
+AS_GOOD = 0.01, 0.1  # of the residuals of the best, and where much is clipped: what a fit may leave more
 NO_SLOPE, STRAY_SLOPE = 1e-6, 0.02  # of the disc's grey over a radius, times the white's; and where light strays on it
 PRINT_SPREAD = 0.01  # of the form, where the print is longer one way
 SURE_GAIN = 15.0  # variances by which either must make the sum of squares less: noise does so once in 2000
@@ -55,7 +56,8 @@ def fit_in_any_light(patch: Patch, known: Prior, height: float, light: float) ->
     """
     plain, known = _in_any_form(fit_disc(patch, known), patch, known)
     stray = _with_spread(known, DISC_SLOPE, STRAY_SLOPE * light)
-    if plain.residual * len(patch.grey) - cost_of(patch, stray, plain.values[:SHAPE]) > SURE_GAIN * plain.residual:
+    gain = plain.residual * len(patch.grey) - cost_of(patch, stray, plain.values[:SHAPE])
+    if gain > SURE_GAIN * plain.residual * confirmed(known.scatter, plain.unexplained):
         known = stray
         plain = fit_disc(patch, known)
     unexplained = _unexplained(plain, patch, known, height, light)
@@ -63,7 +65,7 @@ def fit_in_any_light(patch: Patch, known: Prior, height: float, light: float) ->
         starts = _best_starts(patch, known, height)
         hopeless = HOPELESS * plain.residual if plain.converged else np.inf
         others = (fit_disc(patch, replace(known, start=start), STEPS, hopeless) for start in starts)
-        plain = _best_of([plain, *others], patch)
+        plain = _best_of([plain, *others], patch, known)
         plain, known = _in_any_form(plain, patch, known)
         unexplained = _unexplained(plain, patch, known, height, light)
     if unexplained <= MISSING or not plain.converged:
@@ -111,10 +113,10 @@ def _unexplained(fit: DiscFit, patch: Patch, known: Prior, height: float, light:
     return fit.residual * len(patch.grey) / free * freer / max(left, 1e-12)
 
 
-def _best_of(fits: list[DiscFit], patch: Patch) -> DiscFit:
+def _best_of(fits: list[DiscFit], patch: Patch, known: Prior) -> DiscFit:
     """The fit with the smallest residuals; how far others lie that are as good is in its covariance."""
     best = min(fits, key=lambda fit: (not fit.converged, fit.residual))
-    limit = best.residual * AS_GOOD[int(patch.clipped > MUCH_CLIPPED)]
+    limit = best.residual * (1.0 + AS_GOOD[int(patch.clipped > MUCH_CLIPPED)] * known.scatter)
     others = [fit for fit in fits if fit.converged and fit.residual < limit]
     apart = [fit.values - best.values for fit in others] or [0.0 * best.values]
     far = max(apart, key=lambda away: float(away[:2] @ away[:2]))

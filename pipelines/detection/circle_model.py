@@ -37,11 +37,10 @@ from pipelines.detection.circle_numbers import (
     Prior,
 )
 from pipelines.detection.circle_pixels import at_pixels
+from pipelines.detection.circle_scatter import confirmed, scatter_of_sectors
 from pipelines.detection.erf import GAUSS, decay, signed_share
 from pipelines.detection.kernels import compiled
 
-SECTORS = 12  # of the disc's surroundings, whose residuals are held against each other
-USUAL_SCATTER = 1.5  # of these over the noise: a picture that the model explains stays below
 FURTHEST_STEP = np.array([0.15, 0.15, 0.02, 0.02, 0.02, 0.15, 0.15, 0.05])  # in one iteration
 SOFTNESS_LIMITS = (0.01, 0.6)
 BOX = math.sqrt(12.0)  # width of a box over its standard deviation
@@ -141,11 +140,13 @@ def fit_disc(patch: Patch, prior: Prior, steps: int = STEPS, hopeless: float = m
         step = np.linalg.solve(damped, right)
         if right @ step <= STOP * STOP * noise:
             values[:SHAPE] += step[:SHAPE]
-            covariance = np.linalg.inv(normal) * noise
-            factor, with_size = _unexplained(patch, jacobian, best, covariance), _with_size(covariance)
+            inverse = np.linalg.inv(normal)
+            factor = scatter_of_sectors(patch, jacobian, best - jacobian @ step, inverse, noise, prior.scatter)
+            covariance, with_size = inverse * noise, _with_size(inverse)
             moved = _rim_doubt(patch, values, np.linalg.solve(normal, jacobian.T))
             covariance = covariance * factor + np.outer(moved, moved)
-            oblong = _gain_of_form(normal, right, weigh, values - prior.mean) / noise
+            oblong = _gain_of_form(normal, right, weigh, values - prior.mean)
+            oblong /= noise * confirmed(prior.scatter, factor)
             return DiscFit(values, covariance, True, float(best @ best / len(best)), factor, with_size, oblong)
         trial = values.copy()
         trial[:SHAPE] += np.clip(step[:SHAPE], -FURTHEST_STEP, FURTHEST_STEP)
@@ -204,25 +205,6 @@ def _noise(jacobian: Array, residual: Array) -> float:
     n, numbers = jacobian.shape
     weight = jacobian[:, 0] ** 2 + jacobian[:, 1] ** 2
     return max(np.sum(weight * residual**2) / max(np.sum(weight), 1e-300) * n / (n - numbers), ROUNDING)
-
-
-def _unexplained(patch: Patch, jacobian: Array, residual: Array, covariance: Array) -> float:
-    """Factor of the covariance for what the model does not explain; 1 where it explains the picture.
-
-    Noise is independent from pixel to pixel. What a model leaves out goes on for many: then the pixels of one sector
-    around the disc together pull at its place by far more than noise would.
-
-    Source:
-        White 1980, A heteroskedasticity-consistent covariance matrix estimator, with sectors in the place of pixels.
-    """
-    along = np.arctan2(patch.rows - patch.rows.mean(), patch.columns - patch.columns.mean())
-    sector = np.floor((along / np.pi + 1.0) * 0.5 * SECTORS).astype(np.intp) % SECTORS
-    pulls = np.zeros((SECTORS, jacobian.shape[1]))
-    np.add.at(pulls, sector, jacobian * residual[:, None])
-    moved = pulls @ covariance[:, :2]  # times the noise: each sector's part in the place
-    noise = _noise(jacobian, residual)
-    scatter = np.trace(np.linalg.solve(covariance[:2, :2], moved.T @ moved)) / (2.0 * noise**2)
-    return max(1.0, float(scatter) / USUAL_SCATTER)
 
 
 def _with_size(covariance: Array) -> Array:

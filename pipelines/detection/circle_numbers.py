@@ -46,6 +46,7 @@ class Prior:
     mean: Array  # (16 + m,)
     spread: Array  # (16 + m,) standard deviations
     furthest_shadow: float  # radii
+    scatter: float  # factor, 1 or more, by which the board's corners scatter more than independent noise makes them
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +57,6 @@ class DiscFit:
     covariance: Array  # (16 + m, 16 + m)
     converged: bool
     residual: float  # mean square, grey values^2
-    unexplained: float  # factor of the covariance for what the model leaves out; 1 where it explains the picture
+    unexplained: float  # factor of the covariance for what neighbouring pixels share, see `circle_scatter`
     with_size: Array  # (2,) radii by which the place moves with the size, for a change of it by 1
     oblong: float  # by how many variances the sum of squares would be less if nothing were known of its form

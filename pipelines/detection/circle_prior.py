@@ -30,11 +30,12 @@ SHADOW_SPREAD, SOFTNESS_MEAN, SOFTNESS_SPREAD = 0.9, 0.15, 0.15  # heights
 FURTHEST_SHADOW = 3.6  # heights
 
 
-def known_beforehand(light: float, height: float, misfit: float, beyond_px: float) -> Prior:
+def known_beforehand(light: float, height: float, misfit: float, beyond_px: float, scatter: float) -> Prior:
     """What is known of the circle before its pixels are looked at; what is not known has a wide spread.
 
     light: grey value of the white. height: of the circle above the board, radii. misfit: RMS distance of the corners
     from the board's map, squares. beyond_px: by which edges are wider or narrower than those of a gaussian blur.
+    scatter: factor by which corners scatter more than independent noise makes them; one below 1 does not count.
     """
     start = np.array([0.0, 0.0, 1.0, 0.0, 0.0, *(height * share for share in START_SHADOW)])
     expected, spread = np.zeros(SHAPE + LINEAR), np.full(SHAPE + LINEAR, 1e6)
@@ -45,4 +46,4 @@ def known_beforehand(light: float, height: float, misfit: float, beyond_px: floa
     spread[WHITE_SLOPE], spread[DISC_SLOPE] = 0.5 * light, NO_SLOPE * light
     expected[BLOCKED], spread[BLOCKED] = 0.3 * light, 0.3 * light
     expected[LAMP], spread[LAMP] = 0.6 * light, 0.6 * light
-    return Prior(start, expected, spread, FURTHEST_SHADOW * height)
+    return Prior(start, expected, spread, FURTHEST_SHADOW * height, max(scatter, 1.0))
