@@ -90,21 +90,6 @@ def enlarged(scale):
     return lambda image, rng: cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
 
 
-def shrunk(scale):
-    """A picture made smaller, each pixel the mean of what it covers."""
-    return lambda image, rng: cv2.resize(image, None, fx=1.0 / scale, fy=1.0 / scale, interpolation=cv2.INTER_AREA)
-
-
-def grain(amount, sigma):
-    """Noise of so many grey values, blurred by sigma px."""
-
-    def after(image, rng):
-        noise = gaussian_filter(rng.standard_normal(image.shape), sigma)
-        return _eight_bits(image + amount * noise / noise.std())
-
-    return after
-
-
 def equalised(image, rng):
     """Local contrast enhancement."""
     return cv2.createCLAHE(3.0, (8, 8)).apply(image)
