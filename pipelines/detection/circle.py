@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from eposit.arrays import Array
-from pipelines.detection.board_map import BoardMap, grid
 from pipelines.detection.circle_blur import Blur, edge_blur, still
 from pipelines.detection.circle_doubt import at_least, beyond_the_fit, unexplained_size
 from pipelines.detection.circle_light import MANY_CELLS, MUCH_CLIPPED, fit_in_any_light
+from pipelines.detection.circle_map import MapErrors, map_errors, prediction_covariance
 from pipelines.detection.circle_model import ROUNDING, cost_of, fit_disc
-from pipelines.detection.circle_numbers import DISC_GREY, SHAPE, SIZE, WHITE_GREY, DiscFit, Patch, Prior
-from pipelines.detection.circle_patch import Picture, circle_patch
+from pipelines.detection.circle_numbers import DISC_GREY, FURTHER, SHAPE, SIZE, WHITE_GREY, DiscFit, Patch, Prior
+from pipelines.detection.circle_patch import Picture, circle_patch, of_one_field
 from pipelines.detection.circle_prior import MISFIT_SLOPES, known_beforehand
 from pipelines.detection.consistency import Corners
 from render.targets.chessboard import Chessboard
@@ -34,11 +34,6 @@ SHARPENED_STEPS = 6
 LEAST_CONTRAST = 0.35  # of the board's: what a circle's edge must have
 SEARCH_SHARE = 0.1  # of a square: how far the centre may lie from where the board predicts it, if its map is sure
 FARTHEST_SHARE = 0.25  # of a square, however unsure it is
-CORNER_PX = 0.01  # an ordinary corner's uncertainty, of which that of the map follows
-# How far a lens may lie from one with square pixels, its centre in the picture's, and equidistance, if nothing is known
-# of it; see `generic_lens`. Where the map's lies farther from it, the true one may, too: so many times as far.
-LENS_SPREAD, FARTHER = np.array([0.02, 100.0, 100.0, 0.3, 0.3, 0.3]), 3.0
-STEP = 1e-3 * np.eye(2)  # squares: for slopes along the board
 SURE_SHARE = 0.01  # of a square: a prediction less sure than this has the circle looked for around it
 LOOKS = (5, 9)  # places along both axes of the ellipse in which a circle is looked for
 FEWER_LOOKS = (3, 7)  # likewise a large one
@@ -52,6 +47,7 @@ LEAST_BLUR_PX = 0.7  # below it the fine grid would sample them badly
 MOST_RADIUS_PX = 150.0  # a larger one is read in means whatever it costs: 0.03 px instead of 0.01, in bounded time
 MOTION_SHARE = 0.8  # of the residuals of a picture that stood still, below which those of a motion must be
 MOVED_RADIUS_PX, LONG_STREAK_PX = 60.0, 12.0  # likewise where the picture moved: a fit costs four times as much
+FIELDS_PX = 0.1  # of motion between even rows and odd ones: less changes their edges as a shift does, in proportion
 LEAST_AXIS = 1.5  # blurs: a disc whose smaller half axis is below this has no edges of its own
 
 
@@ -64,24 +60,25 @@ class Circle:
 
 
 def find_circle(
-    image: Picture, corners: Corners, target: Chessboard, misfit: float = 0.0, motion: Blur | None = None
+    image: Picture, corners: Corners, at: Array, target: Chessboard, misfit: float = 0.0, motion: Blur | None = None
 ) -> Circle | None:
     """The circle's centre, or None if there is no dark disc where the board puts it.
 
-    misfit: RMS distance of the corners from the board's map, squares. motion: the blur of a picture that moved.
+    at: (n, 2) squares, of the corners. misfit: RMS distance of the corners from the board's map, squares. motion: the
+    blur of a picture that moved.
     """
     board = corners.board
-    at, height = target.circle_centre[:2] / target.square_mm, target.circle_height_mm / target.square_mm
+    foot, height = target.circle_centre[:2] / target.square_mm, target.circle_height_mm / target.square_mm
     radius = target.circle_radius_mm / target.square_mm
-    axes = np.linalg.svd(board.jacobian(at, height), compute_uv=False) * radius
+    axes = np.linalg.svd(board.jacobian(foot, height), compute_uv=False) * radius
     if axes[-1] < LEAST_AXIS * corners.blur_px:
         return None
     by = _pixels_to_one(float(axes[0]), corners.blur_px, motion)
-    unsure = _unsure(board, target, image.shape)
+    unsure, known = prediction_covariance(board, target, image.shape), map_errors(corners, at, target, image.shape)
     if by > 1:
         image, motion = _means(image, by), motion and motion.scaled(1.0 / by)
         corners = replace(corners, board=board.reduced(by), blur_px=corners.blur_px / by, noise=corners.noise / by**2)
-    place = _Place(image, corners, target, misfit, unsure, None)
+    place = _Place(image, corners, target, misfit, unsure, known, None)
     if motion is not None:
         place = _likelier(place, replace(place, motion=motion))
     found = place.circle()
@@ -120,6 +117,7 @@ class _Place:
     target: Chessboard
     misfit: float
     unsure: Array  # (3, 3) covariance of place, squares, and size, as a share, before the circle is looked at
+    known: MapErrors
     motion: Blur | None  # of a picture that moved
 
     @property
@@ -151,7 +149,9 @@ class _Place:
         covariance = to_px @ fit.covariance[:2, :2] @ to_px.T * max(1.0, left / USUALLY_LEFT)
         radius_px, size = math.sqrt(abs(np.linalg.det(to_px))), fit.values[SIZE] - 1.0
         corners = np.median(self.corners.covariance_px2[self.corners.consistent], axis=0)
-        covariance += beyond_the_fit(to_px @ shift, corners, self._beyond, self.misfit * radius_px / self.radius)
+        misfit_px = self.misfit * radius_px / self.radius
+        covariance += beyond_the_fit(to_px @ shift, corners, self._beyond, misfit_px, radius_px)
+        covariance += to_px @ self.known.shift @ to_px.T
         sure = math.hypot(math.sqrt(self.unsure[2, 2]), MISFIT_SLOPES * self.misfit)
         odd = unexplained_size(size, sure, max(map(abs, self._beyond)) / radius_px)
         return Circle(centre + to_px @ shift, at_least(covariance, odd * (to_px @ fit.with_size)))
@@ -194,11 +194,16 @@ class _Place:
         return circle_patch(self.image, self.corners.board, self.seen, blur, self.target, doubt)
 
     def _fit(self, patch: Patch, known: Prior) -> DiscFit:
-        return fit_in_any_light(patch, known, self.height, self._light(patch))
+        light = self._light(patch)
+        fit = fit_in_any_light(patch, known, self.height, light)
+        if not fit.converged or np.linalg.norm(fit.fields_px) < FIELDS_PX:
+            return fit
+        fields = [of_one_field(patch, first, fit.fields_px) for first in range(2)]
+        return _between(*(fit_in_any_light(field, known, self.height, light) for field in fields))
 
     def _known(self, patch: Patch) -> Prior:
-        light, beyond = self._light(patch), max(map(abs, self._beyond))
-        return known_beforehand(light, self.height, self.misfit, beyond, self.corners.scatter)
+        light, beyond, scatter = self._light(patch), max(map(abs, self._beyond)), self.corners.scatter
+        return known_beforehand(light, self.height, self.misfit, beyond, self.known.form, scatter)
 
     @property
     def _beyond(self) -> tuple[float, float]:
@@ -231,25 +236,16 @@ def _unless_apart(fit: DiscFit, other: DiscFit) -> DiscFit:
     return replace(fit, covariance=covariance)
 
 
-def _unsure(board: BoardMap, target: Chessboard, shape: tuple[int, int]) -> Array:
-    """(3, 3) covariance of how far the circle's height displaces it, squares, and of its size there, as a share.
-
-    It is what one view of the corners tells. Whether a lens is longer along x than along y looks much like a tilt.
-    shape: height and width of the picture, px.
-    """
-    at, height = target.circle_centre[None, :2] / target.square_mm, target.circle_height_mm / target.square_mm
-    slopes = board.slopes(grid(target.inner)).reshape(2 * target.circle_index, -1) / CORNER_PX
-    usual = np.array([0.0, (shape[1] - 1) / 2.0, (shape[0] - 1) / 2.0, 0.0, 0.0, 0.0])
-    spread = np.maximum(LENS_SPREAD, FARTHER * np.abs(board.lens[1:] - usual))
-    slopes = np.vstack((slopes, np.diag(np.append(np.zeros(7), 1.0 / spread))))
-    displaced = (board.slopes(at, height) - board.slopes(at))[0]
-    size = np.maximum(np.linalg.norm(slopes, axis=0), 1e-12)
-    along_x, along_y = ((board.slopes(at + step, height) - board.slopes(at - step, height))[0] for step in STEP)
-    larger = np.einsum("ij,jik->k", np.linalg.inv(board.jacobian(at[0], height)), np.stack((along_x, along_y), axis=1))
-    change = np.vstack((np.linalg.inv(board.jacobian(at[0])) @ displaced, larger / (4.0 * STEP[0, 0]))) / size
-    _, told, axes = np.linalg.svd(slopes / size, full_matrices=False)
-    along = change @ axes.T / np.maximum(told, 1e-13 * told[0])
-    return along @ along.T
+def _between(even: DiscFit, odd: DiscFit) -> DiscFit:
+    """Of two fits, each to every other row: the disc is where it was between the times at which these were taken."""
+    return replace(
+        even,
+        values=0.5 * (even.values[:FURTHER] + odd.values[:FURTHER]),
+        covariance=0.25 * (even.covariance[:FURTHER, :FURTHER] + odd.covariance[:FURTHER, :FURTHER]),
+        converged=even.converged and odd.converged,
+        residual=0.5 * (even.residual + odd.residual),
+        with_size=0.5 * (even.with_size + odd.with_size),
+    )
 
 
 def _looked_for(unsure: Array) -> float:
@@ -261,7 +257,7 @@ def _looked_for(unsure: Array) -> float:
 def _best_start(patch: Patch, known: Prior, unsure: Array, radius: float) -> Array:
     """The best start on a grid over the ellipse in which the prediction is unsure.
 
-    unsure: covariance of the prediction, see `_unsure`. radius: of the circle, squares.
+    unsure: covariance of the prediction, see `prediction_covariance`. radius: of the circle, squares.
     """
     looks = LOOKS if patch.blocked.size <= MANY_CELLS else FEWER_LOOKS
     reach, axes = _looked_at(unsure, radius)

@@ -8,9 +8,13 @@ import numpy as np
 
 from eposit.arrays import Array
 
-OFF_SHARE = 0.02  # of how far it lies off: a map that is wrong there has the circle's form a little wrong, too
+OFF_SHARE = 0.015  # of how far it lies off: a map of the wrong kind there has the circle's form a little wrong, too
 MISFIT_SHARE = 0.05  # of the map's misfit, by which a bent sheet moves it
 CORNERS_SHARE = 0.13  # of the corners' stated error that a circle has at least: what moves them moves it
+GRID = (
+    0.004  # px^1.5, over the root of the radius: by which a fit's fine grid moves a circle, whose edge crosses as many
+)
+# more cells; fits on 2, 3, 4 and 6 cells to a pixel differ by 0.001 px at 15 px
 USUALLY_BEYOND_PX = 0.1  # by which edges differ from those of a gaussian blur in ordinary pictures, defocus included
 WIDTH_ERRORS = 6.0  # corners' stated errors by which noise alone makes edges differ from it
 BEYOND_SHARE, APART_SHARE = 0.085, 0.3  # of what they differ by more, and along one axis more than along the other, by
@@ -21,17 +25,19 @@ SHARPENED_SHARE = 0.15  # of what edges are narrower or wider, by which sharpeni
 RESIZED = 1.8  # times as far as the fit would move at the map's size, what made the size wrong may move the place
 
 
-def beyond_the_fit(off: Array, corners: Array, beyond: tuple[float, float], misfit: float) -> Array:
+def beyond_the_fit(off: Array, corners: Array, beyond: tuple[float, float], misfit: float, radius_px: float) -> Array:
     """(2, 2) px^2 to be added to the covariance of a fit.
 
     off: (2,) px from where the board predicts the circle. corners: (2, 2) px^2, of a corner. beyond: px by which the
-    edges along x and y are wider than those of a gaussian blur. misfit: of the board's map, px.
+    edges along x and y are wider than those of a gaussian blur. misfit: of the map, px. radius_px: of the circle.
     """
     along_x, along_y = beyond
     usual = max(USUALLY_BEYOND_PX, WIDTH_ERRORS * math.sqrt(0.5 * np.trace(corners)))
     wide = max(abs(along_x), abs(along_y), usual) - usual
     apart = max(abs(along_x - along_y), usual) - usual
-    variance = OFF_SHARE**2 * (off @ off) + (BEYOND_SHARE * wide) ** 2 + (APART_SHARE * apart) ** 2
+    variance = (
+        GRID**2 / radius_px + OFF_SHARE**2 * (off @ off) + (BEYOND_SHARE * wide) ** 2 + (APART_SHARE * apart) ** 2
+    )
     return (variance + (MISFIT_SHARE * misfit) ** 2) * np.eye(2) + CORNERS_SHARE**2 * corners
 
 

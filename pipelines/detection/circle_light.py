@@ -17,6 +17,7 @@ from pipelines.detection.circle_numbers import (
     DISC_SLOPE,
     LAMP,
     OBLONG,
+    RIM,
     SHADOW,
     SHAPE,
     WHITE_GREY,
@@ -94,9 +95,9 @@ def _with_spread(known: Prior, which: slice, value: float) -> Prior:
 
 
 def _is_possible(fit: DiscFit) -> bool:
-    """Whether lamp and surroundings give light, and together no more than falls on the white."""
-    white, blocked, lamp = fit.values[WHITE_GREY], fit.values[BLOCKED], fit.values[LAMP]
-    beyond = max(-lamp, -blocked, max(lamp, 0.0) + max(blocked, 0.0) - white)
+    """Whether lamp and surroundings give light, together what falls on the white, and the rim is the lamp's."""
+    white, blocked, lamp, rim = fit.values[[WHITE_GREY, BLOCKED, LAMP, RIM]]
+    beyond = max(-lamp, -blocked, max(lamp, 0.0) + max(blocked, 0.0) - white, -rim, rim - lamp)
     return bool(lamp > 0.0 and beyond < POSSIBLE * white)
 
 

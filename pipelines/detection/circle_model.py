@@ -1,9 +1,10 @@
 """Least squares of the raised circle: a dark disc over a board on which it casts its shade.
 
-On a grid finer than the pixels, the picture is (k + h . x) D + (1 - D) (w + g . x - A b - L s): the disc D with grey k
-and a slope h, as stray light has, over white w with a slope g, of which the disc blocks a share b of the surroundings'
-light, and the lamp's shadow s, a disc of the same size, displaced and with a soft rim. It is moved along the streak of
-a picture that moved, blurred by a gaussian and sampled at the pixels. k, w, g, h, A and L are linear and solved along;
+On a grid finer than the pixels, the picture is (k + h . x) D + (1 - D) (w + g . x - A b - L s - R (r - s)): the disc D
+with grey k and a slope h, as stray light has, over white w with a slope g, of which the disc blocks a share b of the
+surroundings' light, and the lamp's shadow s, a disc of the same size, displaced and with a soft rim. The rim's form is
+that of the lamp: it is fitted between a bell's integral, s, and a straight ramp, r. All is moved along the streak of a
+picture that moved, blurred by a gaussian and sampled at the pixels. k, w, g, h, A, L and R are linear and solved along;
 disc and shadow are moved by Levenberg-Marquardt. Where there are several lamps or windows, further shadows stand for
 the light from a dozen or two of directions, each with an L of its own.
 
@@ -14,6 +15,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,6 +28,7 @@ from pipelines.detection.circle_numbers import (
     LAMP,
     LINEAR,
     OBLONG,
+    RIM,
     SHADOW,
     SHAPE,
     SIZE,
@@ -43,7 +46,7 @@ from pipelines.detection.kernels import compiled
 
 FURTHEST_STEP = np.array([0.15, 0.15, 0.02, 0.02, 0.02, 0.15, 0.15, 0.05])  # in one iteration
 SOFTNESS_LIMITS = (0.01, 0.6)
-BOX = math.sqrt(12.0)  # width of a box over its standard deviation
+BOX = math.sqrt(12.0)  # width of a box over its standard deviation, and of a ramp as wide as a bell's integral
 ROUNDING = 1.0 / 12.0  # variance of a grey value that was rounded: no picture is better known
 STEPS = 60
 PATIENCE = 10  # steps
@@ -56,10 +59,20 @@ class _Picture:
     """The model's picture at one shape: what is linear in it, and what moves."""
 
     opened: Array  # (h, w) share of a fine cell that the disc leaves open
-    shade: Array  # (h, w) share of the lamp that is hidden
-    basis: Array  # (n, 8 + m) pixels for a change of the linear numbers
+    shade: Array  # (2, h, w) share of the lamp that is hidden, and how much more with a straight rim
+    basis: Array  # (n, 9 + m) pixels for a change of the linear numbers
     rim: Array  # (5, h, w) change of `opened` with the disc's x, y, size and form
-    edge: Array  # (3, h, w) change of `shade` with its x, y and softness
+    edge: Array  # (2, 3, h, w) change of `shade` with its x, y and softness
+
+
+class _LastStep(NamedTuple):
+    """Of a fit that has converged."""
+
+    step: Array  # (17 + m,)
+    left: Array  # (n,) residuals behind it
+    normal: Array  # (17 + m, 17 + m) of the normal equations, without the motion between rows
+    aside: Array  # (17 + m, 17 + m) covariance that this motion adds, over the noise
+    fields_px: Array  # (2,)
 
 
 @compiled
@@ -89,21 +102,26 @@ def _open_share(v: Array, p: Array, per_px: Array, finer: int) -> tuple[Array, A
 
 @compiled
 def _shadow(u: Array, p: Array) -> tuple[Array, Array]:
-    """Share of the lamp that is hidden, and its change with the shadow's x, y and softness (3, h, w).
+    """Share of the lamp that is hidden, by a rim that is a bell's integral, and how much more by a ramp (2, h, w).
 
-    u: (2, h, w) places on the board, radii from the disc's foot.
+    Second, their changes with the shadow's x, y and softness (2, 3, h, w). u: (2, h, w) places on the board, radii from
+    the disc's foot.
     """
     _, height, width = u.shape
-    out, slopes = np.empty((height, width)), np.empty((3, height, width))
-    for i in range(out.shape[0]):
-        for j in range(out.shape[1]):
+    out, slopes = np.empty((2, height, width)), np.empty((2, 3, height, width))
+    for i in range(height):
+        for j in range(width):
             a, b = u[0, i, j] - p[5], u[1, i, j] - p[6]
             radius = math.sqrt(a * a + b * b) + 1e-12
             beyond = (radius - 1.0) / p[7]
-            bell = decay(0.5 * beyond * beyond)
-            out[i, j] = 0.5 - 0.5 * signed_share(beyond, bell)
-            slope = 0.5 * GAUSS * bell / p[7]
-            slopes[0, i, j], slopes[1, i, j], slopes[2, i, j] = slope * a / radius, slope * b / radius, slope * beyond
+            bell, along = decay(0.5 * beyond * beyond), 0.5 - beyond / BOX
+            out[0, i, j] = 0.5 - 0.5 * signed_share(beyond, bell)
+            out[1, i, j] = (0.0 if along < 0.0 else 1.0 if along > 1.0 else along) - out[0, i, j]
+            slope, ramp = 0.5 * GAUSS * bell / p[7], 1.0 / (BOX * p[7]) if 0.0 < along < 1.0 else 0.0
+            for k in range(2):
+                slopes[k, 0, i, j], slopes[k, 1, i, j] = slope * a / radius, slope * b / radius
+                slopes[k, 2, i, j] = slope * beyond
+                slope = ramp - slope
     return out, slopes
 
 
@@ -139,28 +157,60 @@ def fit_disc(patch: Patch, prior: Prior, steps: int = STEPS, hopeless: float = m
         damped[range(SHAPE), range(SHAPE)] *= 1.0 + damping
         step = np.linalg.solve(damped, right)
         if right @ step <= STOP * STOP * noise:
-            values[:SHAPE] += step[:SHAPE]
-            inverse = np.linalg.inv(normal)
-            factor = scatter_of_sectors(patch, jacobian, best - jacobian @ step, inverse, noise, prior.scatter)
-            covariance, with_size = inverse * noise, _with_size(inverse)
-            moved = _rim_doubt(patch, values, np.linalg.solve(normal, jacobian.T))
-            covariance = covariance * factor + np.outer(moved, moved)
-            oblong = _gain_of_form(normal, right, weigh, values - prior.mean)
-            oblong /= noise * confirmed(prior.scatter, factor)
-            return DiscFit(values, covariance, True, float(best @ best / len(best)), factor, with_size, oblong)
+            return _finished(patch, prior, values, jacobian, best)
         trial = values.copy()
         trial[:SHAPE] += np.clip(step[:SHAPE], -FURTHEST_STEP, FURTHEST_STEP)
         trial[SHADOW] = np.clip(trial[SHADOW], -prior.furthest_shadow, prior.furthest_shadow)
         trial[SOFTNESS] = np.clip(trial[SOFTNESS], *SOFTNESS_LIMITS)
-    covariance = np.linalg.inv(normal) * noise
-    return DiscFit(values, covariance, False, float(best @ best / len(best)), 1.0, _with_size(covariance), 0.0)
+    covariance, left = np.linalg.inv(normal) * noise, float(best @ best / len(best))
+    return DiscFit(values, covariance, False, left, 1.0, _with_size(covariance), 0.0, np.zeros(2))
+
+
+def _finished(patch: Patch, prior: Prior, values: Array, jacobian: Array, best: Array) -> DiscFit:
+    """A fit's last step, with a motion between even rows and odd ones taken out of it.
+
+    values: (17 + m,) at which the fit has converged. jacobian, best: (n, 17 + m) change of the pixels and (n,)
+    what is left of them there.
+    """
+    fields = _fields(patch, jacobian)
+    first = _last_step(prior, values, jacobian, best, fields, _noise(jacobian, best))
+    last = _last_step(prior, values, jacobian, best, fields, _noise(jacobian, first.left))
+    noise = _noise(jacobian, last.left)
+    fitted, weigh = values + last.step, noise / prior.spread**2
+    inverse = np.linalg.inv(last.normal)
+    factor = scatter_of_sectors(patch, jacobian, last.left, inverse, noise, prior.scatter)
+    covariance, with_size = inverse * noise * factor + noise * last.aside, _with_size(inverse)
+    pull = jacobian.T @ last.left - weigh * (fitted - prior.mean)
+    oblong = _gain_of_form(last.normal, pull, weigh, fitted - prior.mean)
+    oblong /= noise * confirmed(prior.scatter, factor)
+    left = float(last.left @ last.left / len(best))
+    return DiscFit(fitted, covariance, True, left, factor, with_size, oblong, last.fields_px)
+
+
+def _last_step(prior: Prior, values: Array, jacobian: Array, best: Array, fields: Array, noise: float) -> _LastStep:
+    """Least squares of all numbers and of a motion between rows, whose change of the pixels is `fields` (n, 2)."""
+    weigh = noise / prior.spread**2
+    normal, right = jacobian.T @ jacobian, jacobian.T @ best - weigh * (values - prior.mean)
+    normal[np.diag_indices_from(normal)] += weigh + 1e-12 * normal.diagonal()
+    step, moved = np.linalg.solve(normal, right), np.linalg.solve(normal, jacobian.T @ fields)
+    beside, left = fields - jacobian @ moved, best - jacobian @ step
+    spread = np.linalg.inv(fields.T @ beside + noise * np.eye(2))  # a motion of 1 px is usual where there is one
+    share = spread @ (fields.T @ left)
+    return _LastStep(step - moved @ share, left - beside @ share, normal, moved @ spread @ moved.T, share)
+
+
+def _fields(patch: Patch, jacobian: Array) -> Array:
+    """(n, 2) change of the pixels if between rows and those between them the picture moves by 1 px along x, and y."""
+    moved = (jacobian[:, :2] + jacobian[:, SHADOW]) @ patch.per_px
+    side = np.where(patch.rows % 2 == 0, 0.5, -0.5)
+    return moved * (side - side.mean())[:, None]
 
 
 def shadow_of(on_board: Array, place: tuple[float, float], softness: float) -> Array:
     """(h, w) share of a lamp that the disc hides at places (2, h, w), in radii from its foot."""
     shape = np.zeros(SHAPE)
     shape[SHADOW], shape[SOFTNESS] = place, softness
-    return _shadow(on_board, shape)[0]
+    return _shadow(on_board, shape)[0][0]
 
 
 def cost_of(patch: Patch, prior: Prior, shape: Array) -> float:
@@ -175,7 +225,7 @@ def _draw(patch: Patch, shape: Array) -> _Picture:
     opened, rim = _open_share(patch.on_disc, shape, patch.per_px, patch.finer)
     shade, edge = _shadow(patch.on_board, shape)
     white = at_pixels(patch, opened)
-    under = (patch.slope_x, patch.slope_y, -patch.blocked, -shade, *-patch.shadows)
+    under = (patch.slope_x, patch.slope_y, -patch.blocked, *-shade, *-patch.shadows)
     slopes, fields = under[:2], [opened * field for field in under]
     fields[2:2] = [(1.0 - opened) * slope for slope in slopes]
     basis = np.column_stack((1.0 - white, white, *(at_pixels(patch, field) for field in fields)))
@@ -193,10 +243,10 @@ def _moves(patch: Patch, picture: _Picture, values: Array) -> Array:
     """(n, 8) change of the pixels for a change of the shape."""
     gx, gy = values[WHITE_SLOPE] - values[DISC_SLOPE]
     under = values[WHITE_GREY] - values[DISC_GREY] + gx * patch.slope_x + gy * patch.slope_y
-    under -= values[BLOCKED] * patch.blocked + values[LAMP] * picture.shade
+    under -= values[BLOCKED] * patch.blocked + values[LAMP] * picture.shade[0] + values[RIM] * picture.shade[1]
     under -= np.tensordot(values[FURTHER:], patch.shadows, 1)
-    lamp = -values[LAMP] * picture.opened
-    changes = (*(rim * under for rim in picture.rim), *(edge * lamp for edge in picture.edge))
+    edges = (values[LAMP] * picture.edge[0] + values[RIM] * picture.edge[1]) * -picture.opened
+    changes = (*(rim * under for rim in picture.rim), *edges)
     return np.column_stack([at_pixels(patch, change) for change in changes])
 
 
@@ -222,18 +272,6 @@ def _gain_of_form(normal: Array, right: Array, weigh: Array, off: Array) -> floa
     free[form, form] -= weigh[form]
     pull[form] += weigh[form] * off[form]
     return float(pull @ np.linalg.solve(free, pull))
-
-
-def _rim_doubt(patch: Patch, values: Array, solved: Array) -> Array:
-    """(16 + m,) by how much the fit would move if the shadow's rim were a straight ramp as wide as the bell's integral.
-
-    A rim's form is that of the lamp, which is not known; a bell and a box lie on both sides of most.
-    solved: (16 + m, n) change of the numbers for a change of the pixels.
-    """
-    opened, _ = _open_share(patch.on_disc, values, patch.per_px, patch.finer)
-    beyond = np.hypot(*(patch.on_board - values[SHADOW][:, None, None])) - 1.0
-    ramp = np.clip(0.5 - beyond / (BOX * values[SOFTNESS]), 0.0, 1.0)
-    return solved @ at_pixels(patch, values[LAMP] * opened * (ramp - _shadow(patch.on_board, values)[0]))
 
 
 def prepare() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,11 +98,23 @@ def circle_patch(
         blocked=blocked,
         shadows=np.empty((0, *blocked.shape)),
         per_px=from_px,
+        blur_px=blur.px,
         kernel=_kernel(blur.px, finer),
         streak=_streak(blur, finer) if blur.streak.any() else None,
         finer=finer,
         clipped=1.0 - len(rows) / np.count_nonzero(white),
     )
+
+
+def of_one_field(patch: Patch, first: int, moved_px: Array) -> Patch:
+    """The pixels of every other row, from row `first` on, 0 or 1.
+
+    moved_px: (2,) by which the picture moved between these rows and those between them, which blurred the edges of both
+    together: by half of it to either side, along one of two axes.
+    """
+    kept, blur = patch.rows % 2 == first, math.sqrt(max(patch.blur_px**2 - moved_px @ moved_px / 8.0, 0.0))
+    own = replace(patch, grey=patch.grey[kept], rows=patch.rows[kept], columns=patch.columns[kept])
+    return replace(own, blur_px=blur, kernel=_kernel(blur, patch.finer))
 
 
 @compiled

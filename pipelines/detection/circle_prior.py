@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from eposit.arrays import Array
 from pipelines.detection.circle_light import NO_SLOPE
 from pipelines.detection.circle_numbers import (
     BLOCKED,
@@ -13,6 +14,7 @@ from pipelines.detection.circle_numbers import (
     LAMP,
     LINEAR,
     OBLONG,
+    RIM,
     SHADOW,
     SHAPE,
     SIZE,
@@ -30,20 +32,25 @@ SHADOW_SPREAD, SOFTNESS_MEAN, SOFTNESS_SPREAD = 0.9, 0.15, 0.15  # heights
 FURTHEST_SHADOW = 3.6  # heights
 
 
-def known_beforehand(light: float, height: float, misfit: float, beyond_px: float, scatter: float) -> Prior:
+def known_beforehand(
+    light: float, height: float, misfit: float, beyond_px: float, form: Array, scatter: float
+) -> Prior:
     """What is known of the circle before its pixels are looked at; what is not known has a wide spread.
 
     light: grey value of the white. height: of the circle above the board, radii. misfit: RMS distance of the corners
     from the board's map, squares. beyond_px: by which edges are wider or narrower than those of a gaussian blur.
+    form: (2,) deviations of the form that the corners' errors make.
     scatter: factor by which corners scatter more than independent noise makes them; one below 1 does not count.
     """
     start = np.array([0.0, 0.0, 1.0, 0.0, 0.0, *(height * share for share in START_SHADOW)])
     expected, spread = np.zeros(SHAPE + LINEAR), np.full(SHAPE + LINEAR, 1e6)
     expected[SIZE], spread[SIZE] = 1.0, math.hypot(SIZE_SPREAD, MISFIT_SLOPES * misfit)
-    spread[OBLONG] = math.hypot(FORM_SPREAD, FORM_OF_BLUR * beyond_px, MISFIT_SLOPES * misfit)
+    spread[OBLONG] = np.hypot(math.hypot(FORM_SPREAD, FORM_OF_BLUR * beyond_px, MISFIT_SLOPES * misfit), form)
     spread[SHADOW] = height * SHADOW_SPREAD
     expected[SOFTNESS], spread[SOFTNESS] = height * SOFTNESS_MEAN, height * SOFTNESS_SPREAD
     spread[WHITE_SLOPE], spread[DISC_SLOPE] = 0.5 * light, NO_SLOPE * light
     expected[BLOCKED], spread[BLOCKED] = 0.3 * light, 0.3 * light
     expected[LAMP], spread[LAMP] = 0.6 * light, 0.6 * light
+    # Half way between bell and box, which lie on both sides of most lamps' forms.
+    expected[RIM], spread[RIM] = 0.3 * light, 0.3 * light
     return Prior(start, expected, spread, FURTHEST_SHADOW * height, max(scatter, 1.0))

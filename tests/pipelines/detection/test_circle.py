@@ -126,7 +126,7 @@ def exact_corners(image, camera, blur_px=EDGE_BLUR):
 
 
 def found_in(image, camera, blur_px=EDGE_BLUR):
-    return find_circle(image, exact_corners(image, camera, blur_px), TARGET)
+    return find_circle(image, exact_corners(image, camera, blur_px), grid(TARGET.inner), TARGET)
 
 
 @pytest.fixture(scope="module")
@@ -146,9 +146,9 @@ def centroid(camera):
     return np.array([np.sum(x * weight), np.sum(y * weight)]) / np.sum(weight)
 
 
-# Measured without noise: 0.004, 0.007 and 0.022 px, of which the cells of the picture make 0.002. Near by, the shadow
-# hides under the disc, and its rim is not quite what the model says.
-EXACT_PX = {"far": 0.015, "tilted": 0.015, "near": 0.03}
+# Measured without noise: 0.005, 0.006 and 0.028 px, of which the cells of the picture make 0.002. Near by, the shadow
+# hides under the disc, and its rim, that of a square lamp, is not quite what the model says.
+EXACT_PX = {"far": 0.015, "tilted": 0.015, "near": 0.035}
 
 
 @pytest.mark.parametrize("name", VIEWS)

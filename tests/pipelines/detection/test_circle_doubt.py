@@ -9,9 +9,10 @@ from scipy.spatial.transform import Rotation
 
 from pipelines.detection import circle
 from pipelines.detection.board_map import BoardMap, grid
-from pipelines.detection.circle import CORNER_PX, FARTHER, LENS_SPREAD, _unsure, find_circle
+from pipelines.detection.circle import find_circle
 from pipelines.detection.circle_doubt import RESIZED, at_least, beyond_the_fit, unexplained_size
 from pipelines.detection.circle_light import fit_in_any_light
+from pipelines.detection.circle_map import CORNER_PX, FARTHER, LENS_SPREAD, prediction_covariance
 from tests.pipelines.detection import test_circle as drawing
 from tests.supersampled import digitised
 
@@ -48,8 +49,8 @@ def test_noise_in_the_edges_widths_is_not_taken_for_sharpening():
     """In a faint picture corners are unsure by 0.05 px and edges' widths by 0.2; beside sure corners this tells."""
     quiet, none = np.zeros(2), (0.0, 0.0)
     faint, seen = np.eye(2) * 0.05**2, (0.05, -0.2)
-    assert np.allclose(beyond_the_fit(quiet, faint, seen, 0.0), beyond_the_fit(quiet, faint, none, 0.0))
-    assert beyond_the_fit(quiet, SURE, seen, 0.0)[0, 0] > 4.0 * beyond_the_fit(quiet, SURE, none, 0.0)[0, 0]
+    assert np.allclose(beyond_the_fit(quiet, faint, seen, 0.0, 15.0), beyond_the_fit(quiet, faint, none, 0.0, 15.0))
+    assert beyond_the_fit(quiet, SURE, seen, 0.0, 15.0)[0, 0] > 4.0 * beyond_the_fit(quiet, SURE, none, 0.0, 15.0)[0, 0]
 
 
 def changed(board, which, by):
@@ -79,7 +80,8 @@ def test_how_sure_the_map_is_of_a_circles_size_is_what_all_maps_like_it_say(name
     spread = np.maximum(LENS_SPREAD, FARTHER * np.abs(board.lens[1:] - usual))
     known = np.diag(np.append(np.zeros(7), 1.0 / spread))
     expected = math.sqrt(growth @ np.linalg.inv(slopes.T @ slopes + known.T @ known) @ growth)
-    assert abs(math.sqrt(_unsure(board, drawing.TARGET, size[::-1])[2, 2]) / expected - 1.0) < 0.02  # by differences
+    told = prediction_covariance(board, drawing.TARGET, size[::-1])[2, 2]
+    assert abs(math.sqrt(told) / expected - 1.0) < 0.02  # by differences
 
 
 @pytest.mark.full
@@ -89,7 +91,7 @@ def test_a_fit_that_did_not_converge_gives_way_to_one_that_did(monkeypatch):
     told = drawing.exact_corners(image, camera)
     monkeypatch.setattr(circle, "SURE_SHARE", 0.0)
     picture = digitised(image, np.random.default_rng(0), 1.0)
-    expected = find_circle(picture, told, drawing.TARGET)
+    expected = find_circle(picture, told, grid(drawing.TARGET.inner), drawing.TARGET)
     for lost in (0, 1):
         fits = []
 
@@ -98,6 +100,6 @@ def test_a_fit_that_did_not_converge_gives_way_to_one_that_did(monkeypatch):
             return replace(fits[-1], converged=len(fits) - 1 != lost)
 
         monkeypatch.setattr(circle, "fit_in_any_light", one_fails)
-        found = find_circle(picture, told, drawing.TARGET)
+        found = find_circle(picture, told, grid(drawing.TARGET.inner), drawing.TARGET)
         assert len(fits) == 2
         assert np.linalg.norm(found.centre_px - expected.centre_px) < 0.01  # noise moves it by as much

@@ -8,6 +8,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from pipelines.detection import circle_light
+from pipelines.detection.board_map import grid
 from pipelines.detection.circle import find_circle
 from pipelines.detection.circle_numbers import OBLONG
 from pipelines.detection.circle_scatter import SECTORS, confirmed, scatter_of_sectors
@@ -67,7 +68,10 @@ def test_corners_that_scatter_widen_what_is_stated():
     image, camera = drawing.board_with("far")
     picture = filtered(image, np.random.default_rng(1), NOISE)  # in which neither frees the circle's form
     plain = drawing.exact_corners(picture, camera)
-    one, other = (find_circle(picture, replace(plain, scatter=s), drawing.TARGET) for s in (1.0, OF_CORNERS))
+    one, other = (
+        find_circle(picture, replace(plain, scatter=s), grid(drawing.TARGET.inner), drawing.TARGET)
+        for s in (1.0, OF_CORNERS)
+    )
     assert np.linalg.det(other.covariance_px2) > 1.5 * np.linalg.det(one.covariance_px2)
     assert np.allclose(one.centre_px, other.centre_px, atol=1e-3)
 
@@ -87,5 +91,5 @@ def test_filtered_noise_is_not_taken_for_an_oblong_print(monkeypatch):
     for _ in range(12):
         picture = filtered(image, rng, 2.0 * NOISE)
         corners = replace(drawing.exact_corners(picture, camera), scatter=OF_CORNERS)
-        find_circle(picture, corners, drawing.TARGET)
+        find_circle(picture, corners, grid(drawing.TARGET.inner), drawing.TARGET)
     assert not any(freed)
