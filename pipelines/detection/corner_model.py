@@ -30,7 +30,7 @@ FURTHEST_STEP = (0.7, 0.7, 0.15, 0.15, 0.4)  # of the first numbers in one itera
 LEAST_PIXELS = 14  # five more than a shape has numbers: squares of 4 px have them
 SPOILED_NOISES = 25.0  # variances of the noise that the square of a residual must exceed to be no noise
 LEAST_SPOILED = 20.0  # grey levels that it must exceed
-MOST_TOGETHER = 2  # of it and its neighbours that lie half as far off: three are the edge of something
+MOST_TOGETHER = 2  # of it and its neighbours that lie half as far off to its side: three are the edge of something
 MOST_SPOILED = 10  # single pixels of a corner that are left out
 
 
@@ -125,7 +125,8 @@ def _leave_out_spoiled(pixels: CornerPixels, n: int, noise: float) -> int:
     """Number of pixels that are left: the one farthest from the model is taken out if no noise explains it.
 
     A pixel that is white or black whatever falls on it may lie, upon an edge, between its neighbours' values. Where its
-    neighbours are as far off, it is no single pixel but the edge of what covers the board, or of a shadow.
+    neighbours are as far off to the same side, it is no single pixel but the edge of what covers the board, or of a
+    shadow; white and black ones side by side are none.
     """
     worst = 0
     for i in range(n):
@@ -137,7 +138,7 @@ def _leave_out_spoiled(pixels: CornerPixels, n: int, noise: float) -> int:
     beside = 0
     for i in range(n):
         is_near = abs(pixels.x[i] - pixels.x[worst]) < 1.5 and abs(pixels.y[i] - pixels.y[worst]) < 1.5
-        if is_near and 4.0 * pixels.residual[i] ** 2 > square:
+        if is_near and 2.0 * pixels.residual[i] * pixels.residual[worst] > square:
             beside += 1
     if beside > MOST_TOGETHER:
         return n

@@ -193,3 +193,19 @@ def test_pixels_on_a_disc_take_no_part():
     spread = np.trace(covariance, axis1=1, axis2=2) / noise
     assert spread[3] > 1.1 * spread[4]
     assert np.linalg.norm(without, axis=1).max() < ELSEWHERE_PX
+
+
+def test_spoiled_pixels_of_both_kinds_side_by_side_are_left_out():
+    """Two white ones and a black one upon the corner. A piece of a square that is dark for bright covers it."""
+    scene, rng = SCENES["straight"], np.random.default_rng(5)
+    corners = rng.uniform(-0.5, 0.5, (10, 2))
+    image = digitised(mosaic(scene, corners), rng, 1.0)
+    middle = HALF + TILE * 3
+    image[HALF, middle], image[HALF + 1, middle - 1], image[HALF + 1, middle] = 255, 255, 0
+    covered = image[HALF - 4 : HALF - 1, HALF + TILE * 6 - 4 : HALF + TILE * 6 - 1]
+    covered[:] = 255 - covered
+    error, _, covariance, noise, _ = fitted(image, corners, scene, rng)
+    usual = np.median(noise)
+    assert noise[3] < 2.0 * usual
+    assert np.linalg.norm(whitened(error, covariance)[3]) < 4.0  # a normal pair is farther off once in 3000
+    assert noise[6] > 5.0 * usual
