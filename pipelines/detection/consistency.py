@@ -17,6 +17,8 @@ LIMIT_SHARE = 0.03  # or this share of the local square, whichever is more
 LIMIT_SPREADS, MOST_SHARE = 4.0, 0.15  # or so many median distances, up to this share of the local square
 SHARP_SPREADS, SHARP_PX = 12.0, 0.1  # but no more than so many median distances, nor less than this: beside what covers
 # a part of the board a corner may be half a pixel off where all others agree to a hundredth
+MOST_BLURS = 0.25  # that a corner whose own pixels state more than the others' may be off, so many times more: light
+# from elsewhere, of a tenth of the contrast, moves an edge so far. It states its distance as its error
 PLACED_PX = 0.1  # deviation of a corner that something else placed, until their scatter is known
 BAD_SHARE = 0.25  # of the corners that may be inconsistent before the board is, and one of few in any case
 
@@ -59,14 +61,14 @@ def _agreeing(corners: Corners, at: Array, size: tuple[int, int]) -> Corners:
     """The corners of which each agrees with the map through the others, and that map."""
     good, points = corners.consistent.copy(), corners.points_px
     side = np.sqrt(np.abs(np.linalg.det(corners.board.jacobian(at))))
-    board = corners.board
+    board, own = corners.board, _own(corners, good)
     for _ in range(max(1, int(BAD_SHARE * len(points))) + 1):
         if 2 * np.sum(good) <= board.slopes(at).shape[-1]:
             return replace(corners, consistent=np.zeros(len(at), bool))
         weights, board = _weights(corners.covariance_px2, good), _map_through(corners, good, board, at, size)
         distance, spread = _left_out(points, board, at, weights)
         typical = float(np.median(distance[good])) * spread
-        excess = np.where(good, distance / _limits(side, typical, spread), 0.0)
+        excess = np.where(good, distance / _limits(side, typical, spread, own), 0.0)
         worst = int(np.argmax(excess))
         if excess[worst] <= 1.0:
             back = _taken_back(corners, good, board, at, weights)
@@ -100,22 +102,36 @@ def _taken_back(corners: Corners, good: Mask, board: BoardMap, at: Array, weight
     missed = corners.points_px - board(at)
     usual = float(np.median(_left_out(corners.points_px, board, at, weights)[0][good]))
     side = np.sqrt(np.abs(np.linalg.det(board.jacobian(at[lost]))))
-    same = np.ones(len(lost))
-    back[lost] = np.linalg.norm(missed[lost], axis=1) <= _limits(side, usual * same, same)
+    same, own = np.ones(len(lost)), _own(corners, good)[:, lost]
+    back[lost] = np.linalg.norm(missed[lost], axis=1) <= _limits(side, usual * same, same, own)
     extended = smooth_extension(at[good], missed[good], at[lost], missed[lost], usual)
     if extended is not None:
-        limits = _limits(side, extended.typical * extended.spread, same)
+        limits = _limits(side, extended.typical * extended.spread, same, own)
         back[lost] |= np.linalg.norm(extended.missed, axis=1) <= limits
     return back
 
 
-def _limits(side: Array, typical: Array, spread: Array) -> Array:
+def _limits(side: Array, typical: Array, spread: Array, own: Array) -> Array:
     """(n,) largest distances from the map through the others, px.
 
     side: (n,) of the local squares, px. typical: (n,) median distance times `spread`, px. spread: see `_left_out`.
+    own: see `_own`.
     """
-    usual = np.minimum(np.maximum(LIMIT_PX, LIMIT_SHARE * side), np.maximum(SHARP_SPREADS * typical, SHARP_PX * spread))
+    times, most = own
+    sharp = np.maximum(SHARP_SPREADS * typical, SHARP_PX * spread)
+    sharp = np.maximum(sharp, np.minimum(SHARP_SPREADS * typical * times, most))
+    usual = np.minimum(np.maximum(LIMIT_PX, LIMIT_SHARE * side), sharp)
     return np.maximum(usual, np.minimum(LIMIT_SPREADS * typical, MOST_SHARE * side))
+
+
+def _own(corners: Corners, good: Mask) -> Array:
+    """(2, n) how many times the median deviation of the good corners each states of itself, at least once; px at most.
+
+    Once where nothing is known.
+    """
+    variance = np.trace(corners.covariance_px2, axis1=1, axis2=2)
+    times = np.sqrt(np.fmax(variance / np.median(variance[good]), 1.0))
+    return np.stack((times, np.full(len(times), MOST_BLURS * corners.blur_px)))
 
 
 def too_many_bad(consistent: Mask) -> bool:
