@@ -149,6 +149,7 @@ class _Place:
         covariance = to_px @ fit.covariance[:2, :2] @ to_px.T * max(1.0, left / USUALLY_LEFT)
         radius_px, size = math.sqrt(abs(np.linalg.det(to_px))), fit.values[SIZE] - 1.0
         corners = np.median(self.corners.covariance_px2[self.corners.consistent], axis=0)
+        corners += self.corners.rows_px2 * np.eye(2)  # its rim is not known to be moved
         misfit_px = self.misfit * radius_px / self.radius
         covariance += beyond_the_fit(to_px @ shift, corners, self._beyond, misfit_px, radius_px)
         covariance += to_px @ self.known.shift @ to_px.T

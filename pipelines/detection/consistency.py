@@ -10,6 +10,7 @@ from eposit.arrays import Array, Mask
 from pipelines.detection.board_map import BoardMap, Hold
 from pipelines.detection.corner_scatter import leverage, scatter_about
 from pipelines.detection.lone_errors import stated_errors
+from pipelines.detection.row_moves import RowMoves
 from pipelines.detection.smooth_extension import smooth_extension
 
 LIMIT_PX = 0.5  # largest distance of a corner from the map through the others
@@ -37,24 +38,29 @@ class Corners:
     widths_beyond_px: tuple[float, float] = (np.nan, np.nan)  # of edges along x and y, see `widths_beyond`
     exponent: float = 1.0  # of the picture's tone curve, see `tone_curve`
     scatter: float = 1.0  # factor, in the covariances, of what the corners' own pixels state, see `corner_scatter`
+    rows_px2: float = 0.0  # mean square of how far rows are moved from the map, see `row_moves`
 
 
-def drop_inconsistent(corners: Corners, at: Array, size: tuple[int, int]) -> Corners:
+def drop_inconsistent(corners: Corners, at: Array, size: tuple[int, int], moves: RowMoves | None = None) -> Corners:
     """Drop the corner farthest from the map through the others until all the rest agree; scale the covariances.
 
     Corners that are fitted to their own pixels lie where these show them, also where the board's map is a little wrong.
     So the covariances are scaled by what differs from corner to corner, and single corners that lie far from the others
-    state that.
+    state that. moves: of the picture's rows, which are no errors of the corners either.
     """
     agreed = _agreeing(corners, at, size)
     good = agreed.consistent
     if not np.any(good):
         return agreed
+    rows = 0.0
     parts = (at, agreed.points_px - agreed.board(at), agreed.covariance_px2, agreed.board.slopes(at))
     places, missed, covariance, slopes = (part[good] for part in parts)
+    if moves is not None:
+        slopes = np.concatenate((slopes, moves.terms(agreed.points_px[good, 1])), axis=2)
+        rows = float(np.mean(missed**2))
     stated = agreed.covariance_px2.copy()
     stated[good], factor = stated_errors(places, missed, covariance, slopes)
-    return replace(agreed, covariance_px2=stated, scatter=factor)
+    return replace(agreed, covariance_px2=stated, scatter=factor, rows_px2=rows)
 
 
 def _agreeing(corners: Corners, at: Array, size: tuple[int, int]) -> Corners:

@@ -20,6 +20,7 @@ from pipelines.detection.corner_sites import CornerSites
 from pipelines.detection.edge_form_errors import FORM_SHARE, form_errors
 from pipelines.detection.finders import Grey
 from pipelines.detection.hot_pixels import without_hot_pixels
+from pipelines.detection.row_moves import RowMoves, row_moves
 from pipelines.detection.time_limit import Check, unlimited
 from pipelines.detection.tone_curve import Light, decoded, measured_exponent
 
@@ -49,6 +50,7 @@ class _Pass(NamedTuple):
     must_converge: bool
     reach: float  # squares that the window may reach along the edges; 0 where it is to be small
     is_shadowed: bool = False  # whether a shadow's edge may cross the corner
+    moves: RowMoves | None = None  # of the picture's rows
 
 
 NEAR = _Pass(steps=8, must_converge=False, reach=0.0)  # enough for a map to start the final one from
@@ -88,16 +90,34 @@ def refine_corners(
                 light = without_shade(light, board, sites.circled, corners.blur_px)
         limits = FINAL._replace(reach=_form_reach(corners, board, at))
         corners, shapes, _ = _fit(light, board, sites, _next_shapes(corners, shapes, board, at), limits)
+    good = corners.consistent
+    moves = row_moves(at[good], corners.points_px[good], corners.covariance_px2[good], board)
+    if moves is not None:
+        still = corners.points_px - moves(corners.points_px[:, 1])
+        board = _next_map(replace(corners, points_px=still), board, at, size)
+        limits = limits._replace(moves=moves)
+        corners, shapes, _ = _fit(light, board, sites, _next_shapes(corners, shapes, board, at), limits)
     corners = replace(corners, exponent=exponent)
     if np.mean(~corners.consistent) <= MOST_LOST:
         corners = replace(corners, board=_next_map(corners, corners.board, at, size))
         beyond = widths_beyond(light, corners.board, sites, corners.blur_px)
         corners = replace(corners, widths_beyond_px=(float(beyond[0]), float(beyond[1])))
         sites, corners = _with_nearby(light, sites, unseen, corners)
-    corners = drop_inconsistent(corners, sites.at, size)
-    if len(at) >= FEW or not np.any(corners.consistent):
+    corners = drop_inconsistent(corners, sites.at, size, moves)
+    if not np.any(corners.consistent):
         return corners
-    added = form_errors(corners, sites.at, min(sites.reach, limits.reach), size)
+    return _with_form_errors(corners, sites, limits, size, len(at) < FEW)
+
+
+def _with_form_errors(corners: Corners, sites: CornerSites, limits: _Pass, size: tuple[int, int], few: bool) -> Corners:
+    """The corners with what the forms of their edges add, where few corners tell these, or moves of rows bend them."""
+    added = np.zeros((len(sites.at), 2, 2))
+    if few:
+        added += form_errors(corners, sites.at, min(sites.reach, limits.reach), size)
+    if limits.moves is not None:
+        jacobian = corners.board.jacobian(sites.at)
+        pulls = FORM_SHARE * _final_windows(sites, jacobian, limits) ** 2
+        added += limits.moves.form_errors(corners.board(sites.at)[:, 1], jacobian, pulls)
     return replace(corners, covariance_px2=corners.covariance_px2 + added)
 
 
@@ -235,15 +255,18 @@ def _task(board: BoardMap, jacobian: Array, sites: CornerSites, shapes: Array, l
         windows = np.clip(SHADOW_BLURS * blur, SHADOW_PX, FARTHEST_SHADOW_PX)
         bands, sharp = np.full(len(at), np.inf), np.zeros(len(at), bool)
     elif limits.reach > 0.0:
-        windows = np.clip(min(sites.reach, limits.reach) * lengths.max(axis=1), FINAL_PX, FARTHEST_PX)
+        windows = _final_windows(sites, jacobian, limits)
         bands, sharp = BAND_PX + BAND_BLURS * blur, blur < SHARP_PX
     else:
         windows = np.maximum(NEAR_PX, NEAR_BLURS * blur)
         bands, sharp = np.full(len(at), np.inf), np.zeros(len(at), bool)
+    edges = board.edge_forms(at, jacobian, windows)
+    if limits.moves is not None:
+        edges[..., 0] += limits.moves.bends(board(at)[:, 1] + shapes[:, 1], jacobian)
     return CornerTask(
         starts=board(at),
         shapes=shapes,
-        edges=board.edge_forms(at, jacobian, windows),
+        edges=edges,
         sharp=sharp,
         inverses=np.linalg.inv(jacobian),
         reaches=np.clip(sites.next_edge - blurs, sites.least_reach, sites.reach),
@@ -253,6 +276,12 @@ def _task(board: BoardMap, jacobian: Array, sites: CornerSites, shapes: Array, l
         discs=discs,
         disc_axes=disc_axes,
     )
+
+
+def _final_windows(sites: CornerSites, jacobian: Array, limits: _Pass) -> Array:
+    """(n,) px along the edges that each corner's fit uses at most."""
+    reach = min(sites.reach, limits.reach)
+    return np.clip(reach * np.linalg.norm(jacobian, axis=1).max(axis=1), FINAL_PX, FARTHEST_PX)
 
 
 def _is_corner(fitted: Array, covariance: Array, starts: Array, jacobian: Array, sites: CornerSites) -> Mask:

@@ -29,8 +29,6 @@ the views that both found.
 Asked is: nothing wrong, corners found no less often and with an RMS no larger than OpenCV's better one, norm of corners
 and of circles {NORMALISED[0]} to {NORMALISED[1]} (20 circles tell it to 11 %), no picture above {SLOWEST_S:g} s."""
 REASONS = {
-    "rolling-shake": "rows are moved by a wave two squares long, so that neighbours are moved against each other as by "
-    "errors of their own; nothing in one picture tells that from noise, and the stated error is too large",
     "shadow-edge": "a few corners lie on the shadow's edge itself, and on one board nothing tells which way it lies",
     "salt-pepper": "a corner with several spoiled pixels side by side is refused",
     "small": "beside the circle, squares of 9 px leave a corner no pixels that are surely free of the circle's shade",
