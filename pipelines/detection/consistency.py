@@ -133,11 +133,11 @@ def _limits(side: Array, typical: Array, spread: Array, own: Array) -> Array:
 def _own(corners: Corners, good: Mask) -> Array:
     """(2, n) how many times the median deviation of the good corners each states of itself, at least once; px at most.
 
-    Once where nothing is known.
+    Once where nothing is known, as of discs, which have no blur of edges.
     """
     variance = np.trace(corners.covariance_px2, axis1=1, axis2=2)
     times = np.sqrt(np.fmax(variance / np.median(variance[good]), 1.0))
-    return np.stack((times, np.full(len(times), MOST_BLURS * corners.blur_px)))
+    return np.stack((times, np.full(len(times), MOST_BLURS * np.nan_to_num(corners.blur_px))))
 
 
 def too_many_bad(consistent: Mask) -> bool:

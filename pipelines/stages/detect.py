@@ -22,7 +22,6 @@ from datasets.schema import DETECTIONS
 from datasets.store.dataset import Dataset
 from eposit.arrays import Array
 from pipelines.detection import Detection, Detector, PointStatus, detect_points
-from pipelines.detection.prepare import compile_kernels
 from pipelines.detection.time_limit import DETECT_SECONDS
 from render.targets.kinds import AnyTarget
 
@@ -106,6 +105,8 @@ def _is_late(found: Detection) -> bool:
 @functools.cache
 def _load_kernels() -> None:
     """Once in a process, as loading or compiling them is no part of any picture's time."""
+    from pipelines.detection.prepare import compile_kernels
+
     compile_kernels()
 
 

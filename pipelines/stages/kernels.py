@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
@@ -11,9 +12,11 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from datasets.plan import shard_count
 from datasets.store.dataset import Dataset
 from pipelines.detection import Detector
-from pipelines.detection.prepare import Kernels
 from pipelines.stages import detect
 from pipelines.stages.part import Part
+
+if TYPE_CHECKING:
+    from pipelines.detection.prepare import Kernels
 
 WAITING = "detect: compiling its functions, on first use only"
 
@@ -30,6 +33,8 @@ def compiled_ahead(
     if begun is not None or all(detect.is_done(dataset, index, detector) for index in shards):
         yield begun
         return
+    from pipelines.detection.prepare import Kernels
+
     with Kernels() as kernels:
         yield kernels
 

@@ -6,21 +6,24 @@ import functools
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from datasets.plan import frame_count, shard_count
 from datasets.store.dataset import Dataset
 from eposit import Status
 from pipelines.adapters.process import end_function_process
 from pipelines.detection import Detector
-from pipelines.detection.prepare import Kernels
 from pipelines.endings import printable
-from pipelines.stages import bound, detect, estimate, generate, score
+from pipelines.stages import detect, estimate, generate, score
 from pipelines.stages import estimate_images as systems
 from pipelines.stages.import_poses import import_poses
 from pipelines.stages.kernels import compiled_ahead, wait_for
 from pipelines.stages.missing import Execution, Stage, run_missing
 from pipelines.stages.pose_formats import TABLE
 from pipelines.stages.settings import Setting, System, check_detector, check_target
+
+if TYPE_CHECKING:
+    from pipelines.detection.prepare import Kernels
 
 MAKE_AGAIN = "; --overwrite makes them again"
 
@@ -100,6 +103,8 @@ def run_system(dataset: Dataset, system: System, execution: Execution, *, overwr
 
 def run_bound(dataset: Dataset, execution: Execution) -> None:
     """Compute the pixels' bounds that are missing."""
+    from pipelines.stages import bound
+
     stage = Stage("bound", bound.is_done, bound.run_shard, by_frame=True)
     run_missing(stage, dataset, _indices(dataset, execution), execution)
 

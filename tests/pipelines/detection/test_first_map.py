@@ -22,7 +22,7 @@ def test_rough_corners_beside_the_circle_take_no_part_in_the_first_map(monkeypat
         corners = found.points_px.copy()
         corners[BESIDE_CIRCLE] += shift_px
         rough = SeenPoints(found.ids, corners, found.finder)
-        monkeypatch.setattr("pipelines.detection.find_board", lambda *given: rough)
+        monkeypatch.setattr("pipelines.detection.boards.find_board", lambda *given: rough)
         return detect_points(image, TARGET)
 
     expected, shifted = detected(0.0), detected([3.0, -2.0])
