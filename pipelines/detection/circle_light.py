@@ -41,6 +41,7 @@ DOUBTFUL = 1.05  # times the variance that is left with further shadows: the one
 HOPELESS = 3.0  # times its residuals: a start that is so bad after some steps does not become better, of 96 none
 MISSING = 1.2  # likewise: one lamp does not explain them
 AS_GOOD = 0.01, 0.1  # of the residuals of the best, and where much is clipped: what a fit may leave more
+UNDECIDED = 9.0  # variances by which the sums of squares of two fits may differ: three deviations
 NO_SLOPE, STRAY_SLOPE = 1e-6, 0.02  # of the disc's grey over a radius, times the white's; and where light strays on it
 PRINT_SPREAD = 0.01  # of the form, where the print is longer one way
 SURE_GAIN = 15.0  # variances by which either must make the sum of squares less: noise does so once in 2000
@@ -96,9 +97,13 @@ def _with_spread(known: Prior, which: slice, value: float) -> Prior:
 
 def _is_possible(fit: DiscFit) -> bool:
     """Whether lamp and surroundings give light, together what falls on the white, and the rim is the lamp's."""
+    return bool(fit.values[LAMP] > 0.0) and _impossible(fit) < POSSIBLE
+
+
+def _impossible(fit: DiscFit) -> float:
+    """Light that is there and cannot be, or is not and must, as a share of the white's."""
     white, blocked, lamp, rim = fit.values[[WHITE_GREY, BLOCKED, LAMP, RIM]]
-    beyond = max(-lamp, -blocked, max(lamp, 0.0) + max(blocked, 0.0) - white, -rim, rim - lamp)
-    return bool(lamp > 0.0 and beyond < POSSIBLE * white)
+    return float(max(-lamp, -blocked, max(lamp, 0.0) + max(blocked, 0.0) - white, -rim, rim - lamp) / white)
 
 
 def _unexplained(fit: DiscFit, patch: Patch, known: Prior, height: float, light: float) -> float:
@@ -115,10 +120,15 @@ def _unexplained(fit: DiscFit, patch: Patch, known: Prior, height: float, light:
 
 
 def _best_of(fits: list[DiscFit], patch: Patch, known: Prior) -> DiscFit:
-    """The fit with the smallest residuals; how far others lie that are as good is in its covariance."""
+    """Of the fits with the smallest residuals, or as good, the one whose light is the most possible.
+
+    How far others lie that are as good is in its covariance.
+    """
     best = min(fits, key=lambda fit: (not fit.converged, fit.residual))
-    limit = best.residual * (1.0 + AS_GOOD[int(patch.clipped > MUCH_CLIPPED)] * known.scatter)
+    undecided = UNDECIDED * confirmed(known.scatter, best.unexplained) / len(patch.grey)
+    limit = best.residual * (1.0 + max(AS_GOOD[int(patch.clipped > MUCH_CLIPPED)] * known.scatter, undecided))
     others = [fit for fit in fits if fit.converged and fit.residual < limit]
+    best = min(others or [best], key=lambda fit: (max(_impossible(fit), POSSIBLE), fit.residual))
     apart = [fit.values - best.values for fit in others] or [0.0 * best.values]
     far = max(apart, key=lambda away: float(away[:2] @ away[:2]))
     return replace(best, covariance=best.covariance + np.outer(far, far))

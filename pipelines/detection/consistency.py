@@ -136,7 +136,8 @@ def _own(corners: Corners, good: Mask) -> Array:
     Once where nothing is known, as of discs, which have no blur of edges.
     """
     variance = np.trace(corners.covariance_px2, axis1=1, axis2=2)
-    times = np.sqrt(np.fmax(variance / np.median(variance[good]), 1.0))
+    usual = np.median(variance[good]) if np.any(good) else np.inf
+    times = np.sqrt(np.fmax(variance / usual, 1.0))
     return np.stack((times, np.full(len(times), MOST_BLURS * np.nan_to_num(corners.blur_px))))
 
 

@@ -1,8 +1,11 @@
 """A circle whose shadow is not where the fit begins, or has a rim of another form, is found in its place."""
 
+from types import SimpleNamespace
+
 import numpy as np
 
-from pipelines.detection import detect_points
+from pipelines.detection import circle_light, detect_points
+from pipelines.detection.circle_numbers import FURTHER, LAMP, WHITE_GREY, DiscFit
 from tests.pipelines.detection import test_circle as drawing
 from tests.stress.answers import target_of
 from tests.stress.kinds import KINDS
@@ -32,3 +35,21 @@ def test_a_shadows_rim_may_be_a_straight_ramp(monkeypatch):
     truth = drawing.project(camera, drawing.AT[None], drawing.HEIGHT)[0]
     assert np.linalg.norm(circle.centre_px - truth) < 0.018  # measured 0.011
     assert np.sqrt(np.diag(circle.covariance_px2)).max() < 0.012  # measured 0.007
+
+
+def fitted(x, lamp, residual):
+    """A fit at x radii, with a white of 100."""
+    values = np.zeros(FURTHER)
+    values[[0, WHITE_GREY, LAMP]] = x, 100.0, lamp
+    return DiscFit(values, 1e-6 * np.eye(FURTHER), True, residual, 1.0, np.zeros(2), 0.0, np.zeros(2))
+
+
+def test_of_fits_that_explain_the_same_the_possible_one_is_taken_and_the_other_is_in_its_error():
+    """Of 350 pixels a fit may leave 2.6 % more by chance: nine variances."""
+    few, many = (SimpleNamespace(grey=np.zeros(n), clipped=0.0) for n in (350, 35_000))
+    known = SimpleNamespace(scatter=1.0)
+    fits = [fitted(0.0, 60.0, 8.6), fitted(0.06, 240.0, 8.41)]  # a lamp that gives more than there is on the white
+    best = circle_light._best_of(fits, few, known)
+    assert best.values[0] == 0.0
+    assert best.covariance[0, 0] > 0.06**2
+    assert circle_light._best_of(fits, many, known).values[0] == 0.06
