@@ -47,7 +47,6 @@ LEAST_BLUR_PX = 0.7  # below it the fine grid would sample them badly
 MOST_RADIUS_PX = 150.0  # a larger one is read in means whatever it costs: 0.03 px instead of 0.01, in bounded time
 MOTION_SHARE = 0.8  # of the residuals of a picture that stood still, below which those of a motion must be
 MOVED_RADIUS_PX, LONG_STREAK_PX = 60.0, 12.0  # likewise where the picture moved: a fit costs four times as much
-FIELDS_PX = 0.1  # of motion between even rows and odd ones: less changes their edges as a shift does, in proportion
 LEAST_AXIS = 1.5  # blurs: a disc whose smaller half axis is below this has no edges of its own
 
 
@@ -197,7 +196,7 @@ class _Place:
     def _fit(self, patch: Patch, known: Prior) -> DiscFit:
         light = self._light(patch)
         fit = fit_in_any_light(patch, known, self.height, light)
-        if not fit.converged or np.linalg.norm(fit.fields_px) < FIELDS_PX:
+        if not fit.converged or not np.any(fit.fields_px):
             return fit
         fields = [of_one_field(patch, first, fit.fields_px) for first in range(2)]
         return _between(*(fit_in_any_light(field, known, self.height, light) for field in fields))

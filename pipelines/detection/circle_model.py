@@ -47,9 +47,9 @@ from pipelines.detection.kernels import compiled
 FURTHEST_STEP = np.array([0.15, 0.15, 0.02, 0.02, 0.02, 0.15, 0.15, 0.05])  # in one iteration
 SOFTNESS_LIMITS = (0.01, 0.6)
 BOX = math.sqrt(12.0)  # width of a box over its standard deviation, and of a ramp as wide as a bell's integral
-FIELDS_GAIN = (
-    20.0  # fall of the squared residuals over the noise from a motion between rows; noise feigns it once in 20 000
-)
+# Of a motion between rows: px, of which resampling alone makes 0.13, and the fall of the squared residuals over the
+# noise, which noise alone makes once in 20 000.
+FIELDS_PX, FIELDS_GAIN = 0.3, 20.0
 ROUNDING = 1.0 / 12.0  # variance of a grey value that was rounded: no picture is better known
 STEPS = 60
 PATIENCE = 10  # steps
@@ -193,7 +193,7 @@ def _finished(patch: Patch, prior: Prior, values: Array, jacobian: Array, best: 
 def _last_step(prior: Prior, values: Array, jacobian: Array, best: Array, fields: Array, noise: float) -> _LastStep:
     """Least squares of all numbers and of a motion between rows, whose change of the pixels is `fields` (n, 2).
 
-    A motion that noise alone may feign is left out: rows and columns are then alike.
+    A motion that noise or resampling may feign is left out: rows and columns are then alike.
     """
     weigh = noise / prior.spread**2
     normal, right = jacobian.T @ jacobian, jacobian.T @ best - weigh * (values - prior.mean)
@@ -202,7 +202,7 @@ def _last_step(prior: Prior, values: Array, jacobian: Array, best: Array, fields
     beside, left = fields - jacobian @ moved, best - jacobian @ step
     spread = np.linalg.inv(fields.T @ beside + noise * np.eye(2))  # a motion of 1 px is usual where there is one
     share = spread @ (fields.T @ left)
-    if share @ (fields.T @ left) < FIELDS_GAIN * noise:
+    if share @ share < FIELDS_PX**2 or share @ (fields.T @ left) < FIELDS_GAIN * noise:
         return _LastStep(step, left, normal, np.zeros_like(normal), np.zeros(2))
     return _LastStep(step - moved @ share, left - beside @ share, normal, moved @ spread @ moved.T, share)
 
