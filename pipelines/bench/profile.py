@@ -84,5 +84,5 @@ def _detection(image: Any, target: Any) -> Iterator[tuple[str, Call, str, Call]]
     subpix = lambda: cv2.cornerSubPix(image, start.copy(), SUBPIX_WINDOW, (-1, -1), SUBPIX_STOP)  # noqa: E731
     yield "corners", functools.partial(refine_corners, image, rough(), sites), "cv2.cornerSubPix", subpix
     corners = refine_corners(image, rough(), sites)
-    circle = functools.partial(find_circle, image, corners, target)
+    circle = functools.partial(find_circle, image, corners, sites.at, target)
     yield "circle", circle, "cv2.cornerSubPix", subpix
