@@ -11,10 +11,9 @@ from eposit.arrays import Array
 OFF_SHARE = 0.015  # of how far it lies off: a map of the wrong kind there has the circle's form a little wrong, too
 MISFIT_SHARE = 0.05  # of the map's misfit, by which a bent sheet moves it
 CORNERS_SHARE = 0.13  # of the corners' stated error that a circle has at least: what moves them moves it
-GRID = (
-    0.004  # px^1.5, over the root of the radius: by which a fit's fine grid moves a circle, whose edge crosses as many
-)
-# more cells; fits on 2, 3, 4 and 6 cells to a pixel differ by 0.001 px at 15 px
+# px^1.5, over the root of the radius: by which a fit's fine grid moves a circle; the edge of a larger one crosses more
+# cells. Fits on 2, 3, 4 and 6 cells to a pixel differ by 0.001 px at 15 px.
+GRID = 0.004
 USUALLY_BEYOND_PX = 0.1  # by which edges differ from those of a gaussian blur in ordinary pictures, defocus included
 WIDTH_ERRORS = 6.0  # corners' stated errors by which noise alone makes edges differ from it
 BEYOND_SHARE, APART_SHARE = 0.085, 0.3  # of what they differ by more, and along one axis more than along the other, by
