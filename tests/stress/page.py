@@ -29,14 +29,8 @@ the views that both found.
 Asked is: nothing wrong, corners found no less often and with an RMS no larger than OpenCV's better one, norm of corners
 and of circles {NORMALISED[0]} to {NORMALISED[1]} (20 circles tell it to 11 %), no picture above {SLOWEST_S:g} s."""
 REASONS = {
-    "shadow-edge": "a few corners lie on the shadow's edge itself, and on one board nothing tells which way it lies",
-    "salt-pepper": "a corner with several spoiled pixels side by side is refused",
-    "small": "beside the circle, squares of 9 px leave a corner no pixels that are surely free of the circle's shade",
-    "ghost": "the reflected picture is smooth and moves neighbours alike, which the stated error takes for a misfit of "
-    "the map; upon the circle it looks like a shadow",
-    "interlaced": "odd and even rows show two circles; the fit takes their difference for noise and states too much",
     "phone": "a filter that keeps edges leaves a shadow's rim another form than any lens",
-    "median": "as `phone`",
+    "ink-thin": "a print whose black is thinner has a circle of another size than the map says",
 }  # by kind, why it does not hold everything
 COLUMNS = ["kind", "views", "found", "classic", "sector", "wrong", "RMS", "bias", "norm", "on shared: ours, classic",
            "ours, sector", "mean, slowest s", "classic s", "sector s"]  # fmt: skip
