@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import hashlib
 import json
 import tomllib
@@ -161,7 +160,7 @@ class Recipe(BaseModel):
         return cut
 
     def __hash__(self) -> int:
-        return hash((self.name, self.seed, len(self.cameras)))  # a cheap one: plans are kept by recipe
+        return hash(self.digest())
 
     def digest(self) -> str:
         """Hash of everything that decides the content; name and description do not, nor how samples are chosen.
@@ -169,20 +168,15 @@ class Recipe(BaseModel):
         Sections that a recipe leaves out take no part, nor do later keys of its sensor, so that these do not change the
         hashes of old recipes. Of a world's file its hash counts, not its place.
         """
-        return _digest(self)
-
-
-@functools.lru_cache(maxsize=16)  # asked for once a shard
-def _digest(recipe: Recipe) -> str:
-    content = recipe.model_dump(mode="json", exclude={"name", "description", "quality"})
-    content["sensor"] = sensor_values(recipe.sensor)
-    content |= {"samples": recipe.sample_count(), "target": target_values(recipe.target)}
-    for name, default in (("world", World()), ("outputs", Outputs()), ("optics", Optics())):
-        if getattr(recipe, name) == default:
-            del content[name]
-    if "world" in content and recipe.world.file_sha256:
-        del content["world"]["file"]
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+        content = self.model_dump(mode="json", exclude={"name", "description", "quality"})
+        content["sensor"] = sensor_values(self.sensor)
+        content |= {"samples": self.sample_count(), "target": target_values(self.target)}
+        for name, default in (("world", World()), ("outputs", Outputs()), ("optics", Optics())):
+            if getattr(self, name) == default:
+                del content[name]
+        if "world" in content and self.world.file_sha256:
+            del content["world"]["file"]
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def parse_recipe(text: str, source: str) -> Recipe:

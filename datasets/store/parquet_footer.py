@@ -122,10 +122,7 @@ class _Compact:
         return self._data[self._at - count : self._at]
 
     def _unsigned(self) -> int:
-        value = self._byte()
-        if value < 128:
-            return value
-        value, shift = value & 127, 7
+        value = shift = 0
         while True:
             byte = self._byte()
             value |= (byte & 127) << shift

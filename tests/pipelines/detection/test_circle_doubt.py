@@ -103,5 +103,5 @@ def test_a_fit_that_did_not_converge_gives_way_to_one_that_did(monkeypatch):
         found = find_circle(picture, told, grid(drawing.TARGET.inner), drawing.TARGET)
         assert len(fits) == 2
         away = found.centre_px - expected.centre_px
-        # Two stated deviations; measured 0.8. The fits read other pixels around the circle.
-        assert away @ np.linalg.solve(expected.covariance_px2, away) < 4.0
+        # One and a half stated deviations; measured 0.8. The fits read other pixels around the circle.
+        assert away @ np.linalg.solve(expected.covariance_px2, away) < 2.25
