@@ -6,8 +6,8 @@ SETUP := $(VENV)/.done
 BLENDER := .venv-blender
 BLENDER_PYTHON ?= $(PYTHON)
 
-.PHONY: help setup demo nightly test test-full check-slow stress test-oldest test-newest lint types layers layers-picture docs bench \
-	bench-blender measurements wheel lock clean
+.PHONY: help setup demo nightly test test-full test-gpu check-slow stress test-oldest test-newest lint types layers layers-picture \
+	docs bench bench-blender measurements wheel lock clean
 
 help:  ## this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 16
@@ -49,6 +49,9 @@ test-full: $(SETUP)  ## adds long cases, kills, a Ray cluster, an object store, 
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade --target build/moto "moto[server]>=5"
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade --target build/gcs gcp-storage-emulator
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m full
+
+test-gpu: $(SETUP)  ## the tests of rendering on a CUDA GPU
+	EPOSIT_VARIANT=cuda_ad_rgb $(BIN)/python -m pytest -m "not slow" tests/render
 
 check-slow: $(SETUP)  ## kills at random moments, two commands at once
 	$(BIN)/python -m pytest -m slow

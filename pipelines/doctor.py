@@ -26,7 +26,7 @@ def diagnose() -> list[Check]:
         Check("python", True, f"{platform.python_version()} on {platform.system()} {platform.machine()}"),
         *map(_library, LIBRARIES),
         _compiler(),
-        Check("CUDA GPU", True, "found: cuda_ad_rgb is used" if gpu else "none: llvm_ad_rgb is used"),
+        Check("CUDA GPU", True, "found; EPOSIT_VARIANT=cuda_ad_rgb renders on it" if gpu else "none; the CPU renders"),
         Check("cores", True, str(usable_cores())),
         _names(),
     ]

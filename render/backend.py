@@ -89,12 +89,13 @@ def cuda_present() -> bool:
 def load() -> Any:  # Any: the attributes of the module are those of the variant that it is set to
     """Mitsuba with its variant fixed for this process.
 
-    `EPOSIT_VARIANT` chooses between llvm_ad_rgb and cuda_ad_rgb; without it a CUDA GPU is used where there is one.
+    `EPOSIT_VARIANT` chooses between llvm_ad_rgb and cuda_ad_rgb. Without it the CPU renders, also where there is a GPU:
+    a recipe gives the same bits on machines of one type of CPU, and a GPU has bits of its own.
 
     Raises:
         BackendError: unknown variant, no usable LLVM, or another variant already runs in this process.
     """
-    variant = os.environ.get("EPOSIT_VARIANT") or (CUDA_VARIANT if cuda_present() else CPU_VARIANT)
+    variant = os.environ.get("EPOSIT_VARIANT") or CPU_VARIANT
     if variant not in VARIANTS:
         raise BackendError(f"EPOSIT_VARIANT is {variant!r}; it must be one of {', '.join(VARIANTS)}")
     if variant == CPU_VARIANT:

@@ -73,6 +73,7 @@ class TracedScene:
             hit = self.target.ray_intersect(ray)
             missed &= ~hit.is_valid()
             ray.o = dr.select(hit.is_valid(), hit.spawn_ray(rays.direction).o, ray.o)
+        dr.eval(ray, missed)  # a kernel traces one scene on a GPU; the rays of a second one would be left out
         return ray, missed
 
     def blocked(self, rays: RayCamera, pixels: Pixels, samples: int, seed: int) -> NDArray[np.float32]:
@@ -81,7 +82,9 @@ class TracedScene:
         def radiance(found: PixelRays) -> tuple[DeviceSpectrum, DeviceFloat]:
             mi, dr = backend.load(), backend.jit()
             ray = mi.Ray3f(found.origin, found.direction)
-            first, target = self.scene.ray_intersect(self.placement.ray(ray)), self.target.ray_intersect(ray)
+            target = self.target.ray_intersect(ray)
+            dr.eval(target)  # see `_past_target`
+            first = self.scene.ray_intersect(self.placement.ray(ray))
             limit = target.t * self.placement.scale * (1.0 - RELATIVE_DEPTH)
             in_front = target.is_valid() & (first.t < limit) & found.seen
             return dr.zeros(mi.Spectrum, dr.width(in_front)), dr.select(in_front, 1.0, 0.0)

@@ -60,6 +60,18 @@ def test_an_unusable_compiler_gives_one_sentence(name, place, cli):
     assert_refused(CASES[name], place, cli)
 
 
+def test_the_cpu_renders_where_there_is_a_gpu(monkeypatch):
+    """A GPU beside it must not change a recipe's bits; Mitsuba refuses another variant than the one that runs here."""
+    variant = backend.load().variant()
+    monkeypatch.setattr(backend, "cuda_present", lambda: True)
+    monkeypatch.delenv("EPOSIT_VARIANT", raising=False)
+    if variant == backend.CPU_VARIANT:
+        assert backend.load.__wrapped__().variant() == variant
+    else:
+        with pytest.raises(backend.BackendError, match="already runs"):
+            backend.load.__wrapped__()
+
+
 @pytest.mark.parametrize("workers", [pytest.param(1, marks=pytest.mark.full), 2])
 def test_an_unusable_compiler_in_a_process_of_its_own(workers, place):
     library = {backend.LIBRARY_VARIABLE: fake_library("libLLVM.so")(place), "EPOSIT_VARIANT": backend.CPU_VARIANT}
