@@ -25,7 +25,6 @@ from pipelines.detection.printed import check_seen, find_points, place_points
 from pipelines.detection.seen_points import SeenPoints
 from pipelines.detection.statuses import STATUS_TYPE, PointStatus
 from pipelines.detection.time_limit import Check
-from pipelines.detection.tone_curve import decoded
 from render.targets.chessboard import Chessboard
 from render.targets.printed import PrintedBoard
 
@@ -71,7 +70,7 @@ def detect_chessboard(image: Grey, target: Chessboard, detector: str, check_time
     at = grid(target.inner)[ids]
     misfit = misfit_squares(corners, at)
     check_time()
-    light = decoded(image, corners.exponent)
+    light = corners.encoding.light(image, corners.points_px[corners.consistent])
     if is_of_another_size(light, corners, at, target):
         return nothing(count, PointStatus.OTHER_BOARD, seen.finder)
     motion = motion_blur(light, corners.board, chessboard_sites(target).chosen(ids[corners.consistent]))
@@ -85,7 +84,7 @@ def detect_chessboard(image: Grey, target: Chessboard, detector: str, check_time
     if circle is not None:
         points[-1], status[-1] = circle.centre_px, PointStatus.OK
         covariance[-1] = circle.covariance_px2
-    found = Detection(points, covariance, status, seen.finder, corners.blur_px, corners.exponent)
+    found = Detection(points, covariance, status, seen.finder, corners.blur_px, corners.encoding)
     return _smoothed(found, corners, ids, at) if detector == Detector.BOARD_FIT else found
 
 

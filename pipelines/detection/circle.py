@@ -18,7 +18,7 @@ from scipy.optimize import minimize_scalar
 
 from eposit.arrays import Array
 from pipelines.detection.circle_blur import Blur, edge_blur, still
-from pipelines.detection.circle_doubt import at_least, beyond_the_fit, unexplained_size
+from pipelines.detection.circle_doubt import at_least, beyond_the_fit, moved_edges, unexplained_size
 from pipelines.detection.circle_light import MANY_CELLS, MUCH_CLIPPED, fit_in_any_light
 from pipelines.detection.circle_map import MapErrors, map_errors, prediction_covariance
 from pipelines.detection.circle_model import ROUNDING, cost_of, fit_disc
@@ -150,11 +150,11 @@ class _Place:
         corners = np.median(self.corners.covariance_px2[self.corners.consistent], axis=0)
         corners += self.corners.rows_px2 * np.eye(2)  # its rim is not known to be moved
         misfit_px = self.misfit * radius_px / self.radius
-        covariance += beyond_the_fit(to_px @ shift, corners, self._beyond, misfit_px, radius_px)
+        covariance += beyond_the_fit(to_px @ shift, corners, self._beyond, misfit_px, self._odd(fit), radius_px)
         covariance += to_px @ self.known.shift @ to_px.T
         sure = math.hypot(math.sqrt(self.unsure[2, 2]), MISFIT_SLOPES * self.misfit)
-        odd = unexplained_size(size, sure, max(map(abs, self._beyond)) / radius_px)
-        return Circle(centre + to_px @ shift, at_least(covariance, odd * (to_px @ fit.with_size)))
+        resized = unexplained_size(size, sure, max(map(abs, self._beyond)) / radius_px) * (to_px @ fit.with_size)
+        return Circle(centre + to_px @ shift, at_least(covariance, resized))
 
     @property
     def blur(self) -> Blur:
@@ -212,6 +212,12 @@ class _Place:
             return 0.0, 0.0  # it was found from their widths
         along_x, along_y = np.nan_to_num(self.corners.widths_beyond_px)
         return float(along_x), float(along_y)
+
+    def _odd(self, fit: DiscFit) -> float:
+        """Px by which edges seem to be moved; none where it is a motion between rows that makes corners look odd."""
+        if np.any(fit.fields_px):
+            return 0.0
+        return moved_edges(self.corners.noise, fit.residual, self.corners.contrast, self.corners.blur_px)
 
     def _light(self, patch: Patch) -> float:
         """Grey value of the white."""

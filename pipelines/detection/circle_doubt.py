@@ -18,17 +18,36 @@ USUALLY_BEYOND_PX = 0.1  # by which edges differ from those of a gaussian blur i
 WIDTH_ERRORS = 6.0  # corners' stated errors by which noise alone makes edges differ from it
 BEYOND_SHARE, APART_SHARE = 0.085, 0.3  # of what they differ by more, and along one axis more than along the other, by
 # which a circle may be off: its shade looks like what sharpening and motion leave beside an edge
+ODD_SHARE = 0.25  # of how far the corners' edges seem to be moved, by which a circle may be, as its contrast differs
+ODD = 2.0, 4.0  # times the variance that the circle's fit leaves: up to the first the two may differ by chance, and
+# what corners show beyond the second lies at their tips alone
+PER_SLOPE = math.sqrt(2.0 * math.pi)  # blurs over which an edge's steepest part would rise from black to white
 USUAL_SIZE = 0.0005  # by which a fit that explains the picture finds another size than the map's
 SURE_SIZE = 0.5  # deviations of the map's size that also say nothing
 SHARPENED_SHARE = 0.15  # of what edges are narrower or wider, by which sharpening shifts a rim all around
 RESIZED = 1.8  # times as far as the fit would move at the map's size, what made the size wrong may move the place
 
 
-def beyond_the_fit(off: Array, corners: Array, beyond: tuple[float, float], misfit: float, radius_px: float) -> Array:
+def moved_edges(noise: float, left: float, contrast: float, blur_px: float) -> float:
+    """Px by which edges seem to be moved whose form is none of a blur: filters that keep edges and others make such.
+
+    noise, left: variances that the fits of corners leave, NaN if not known, and of the circle, grey values^2.
+    contrast: of white and black, grey values.
+    """
+    usual, most = ODD
+    if not noise > usual * left:
+        return 0.0
+    return PER_SLOPE * blur_px * math.sqrt(min(noise, most * left) - usual * left) / contrast
+
+
+def beyond_the_fit(
+    off: Array, corners: Array, beyond: tuple[float, float], misfit: float, odd: float, radius_px: float
+) -> Array:
     """(2, 2) px^2 to be added to the covariance of a fit.
 
     off: (2,) px from where the board predicts the circle. corners: (2, 2) px^2, of a corner. beyond: px by which the
-    edges along x and y are wider than those of a gaussian blur. misfit: of the map, px. radius_px: of the circle.
+    edges along x and y are wider than those of a gaussian blur. misfit: of the map, px. odd: px, see `moved_edges`.
+    radius_px: of the circle.
     """
     along_x, along_y = beyond
     usual = max(USUALLY_BEYOND_PX, WIDTH_ERRORS * math.sqrt(0.5 * np.trace(corners)))
@@ -37,7 +56,8 @@ def beyond_the_fit(off: Array, corners: Array, beyond: tuple[float, float], misf
     variance = (
         GRID**2 / radius_px + OFF_SHARE**2 * (off @ off) + (BEYOND_SHARE * wide) ** 2 + (APART_SHARE * apart) ** 2
     )
-    return (variance + (MISFIT_SHARE * misfit) ** 2) * np.eye(2) + CORNERS_SHARE**2 * corners
+    variance += (MISFIT_SHARE * misfit) ** 2 + (ODD_SHARE * odd) ** 2
+    return variance * np.eye(2) + CORNERS_SHARE**2 * corners
 
 
 def unexplained_size(size: float, sure: float, beyond: float) -> float:

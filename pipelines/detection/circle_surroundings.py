@@ -14,11 +14,14 @@ FARTHEST_PARALLAX = 3.0  # heights of the circle: a larger one is an ambiguous m
 SMALL_PARALLAX = 0.3  # squares: up to here the circle may be displaced either way, which a small tilt leaves open
 
 
-def ellipses_around_circle(board: BoardMap, target: Chessboard, blur_px: float) -> tuple[Array, Array]:
+def ellipses_around_circle(board: BoardMap, target: Chessboard | None, blur_px: float) -> tuple[Array, Array]:
     """Ellipses of one form: at the circle's foot, and where its height may displace it.
 
-    Returns their centres (k, 2) px, k from 1 to 3, and the map (2, 2) from px to the unit circle of such an ellipse.
+    target: None for a board without a circle. Returns their centres (k, 2) px, k from 1 to 3 or 0 without a circle, and
+    the map (2, 2) from px to the unit circle of such an ellipse.
     """
+    if target is None:
+        return np.empty((0, 2)), np.eye(2)
     foot, height = target.circle_centre[:2] / target.square_mm, target.circle_height_mm / target.square_mm
     base, jacobian = board(foot), board.jacobian(foot)
     inverse = np.linalg.inv(jacobian)

@@ -9,6 +9,7 @@ import numpy as np
 from eposit.arrays import Array, Mask
 from pipelines.detection.board_map import BoardMap, Hold
 from pipelines.detection.corner_scatter import leverage, scatter_about
+from pipelines.detection.encoding import PLAIN, Encoding
 from pipelines.detection.lone_errors import stated_errors
 from pipelines.detection.row_moves import RowMoves
 from pipelines.detection.smooth_extension import smooth_extension
@@ -36,7 +37,7 @@ class Corners:
     board: BoardMap  # through the consistent ones
     noise: float = np.nan  # median variance of what the fits leave, grey values^2
     widths_beyond_px: tuple[float, float] = (np.nan, np.nan)  # of edges along x and y, see `widths_beyond`
-    exponent: float = 1.0  # of the picture's tone curve, see `tone_curve`
+    encoding: Encoding = PLAIN  # of the picture
     scatter: float = 1.0  # factor, in the covariances, of what the corners' own pixels state, see `corner_scatter`
     rows_px2: float = 0.0  # mean square of how far rows are moved from the map, see `row_moves`
 

@@ -18,11 +18,12 @@ from pipelines.detection.corner_picture import BLUR, CONTRAST, MEAN, SHAPE, SLOP
 from pipelines.detection.corner_shadow import fit_shadowed, looks_shadowed
 from pipelines.detection.corner_sites import CornerSites
 from pipelines.detection.edge_form_errors import FORM_SHARE, form_errors
+from pipelines.detection.encoding import PLAIN, measured_encoding
 from pipelines.detection.finders import Grey
 from pipelines.detection.hot_pixels import without_hot_pixels
 from pipelines.detection.row_moves import RowMoves, row_moves
 from pipelines.detection.time_limit import Check, unlimited
-from pipelines.detection.tone_curve import Light, decoded, measured_exponent
+from pipelines.detection.tone_curve import Light, decoded
 
 STOP = 0.5  # step, in standard deviations, at which a fit has converged; it is still made
 LEAST_CLEAR = 0.5  # of a place's own `clear`, however blurred the print beyond is
@@ -76,16 +77,19 @@ def refine_corners(
     light = decoded(image, 1.0)
     starts = _start_shapes(board, at, measured_blur(light, board, sites))
     corners, shapes, _ = _fit(light, board, sites, starts, NEAR)
-    exponent, limits = 0.0, NEAR
+    encoding, limits = None, NEAR
     for _ in range(2 if len(at) < FEW else 1):
         check_time()
         good = corners.consistent
         if np.mean(~good) > MOST_LOST:
             return corners
         board = _next_map(corners, board, at, size)
-        if not exponent:
-            exponent = measured_exponent(image, light, board, sites)
-            light = decoded(image, exponent) if exponent != 1.0 else light
+        if encoding is None:
+            encoding = measured_encoding(image, board, sites, corners.blur_px)
+            light = light if encoding == PLAIN else encoding.light(image, board(at))
+            if encoding.sharpening is not None:
+                starts = _start_shapes(board, at, measured_blur(light, board, sites))
+                corners, shapes, _ = _fit(light, board, sites, starts, NEAR)
             if sites.circled is not None:
                 light = without_shade(light, board, sites.circled, corners.blur_px)
         limits = FINAL._replace(reach=_form_reach(corners, board, at))
@@ -97,7 +101,7 @@ def refine_corners(
         board = _next_map(replace(corners, points_px=still), board, at, size)
         limits = limits._replace(moves=moves)
         corners, shapes, _ = _fit(light, board, sites, _next_shapes(corners, shapes, board, at), limits)
-    corners = replace(corners, exponent=exponent)
+    corners = replace(corners, encoding=encoding or PLAIN)
     if np.mean(~corners.consistent) <= MOST_LOST:
         corners = replace(corners, board=_next_map(corners, corners.board, at, size))
         beyond = widths_beyond(light, corners.board, sites, corners.blur_px)
@@ -249,7 +253,7 @@ def _task(board: BoardMap, jacobian: Array, sites: CornerSites, shapes: Array, l
     at = sites.at
     lengths = np.linalg.norm(jacobian, axis=1)
     blur = shapes[:, BLUR]
-    discs, disc_axes = _covered(board, sites, float(np.median(blur)))
+    discs, disc_axes = ellipses_around_circle(board, sites.circled, float(np.median(blur)))
     blurs = CLEAR_BLURS * blur[:, None] / lengths
     if limits.is_shadowed:
         windows = np.clip(SHADOW_BLURS * blur, SHADOW_PX, FARTHEST_SHADOW_PX)
@@ -291,10 +295,3 @@ def _is_corner(fitted: Array, covariance: Array, starts: Array, jacobian: Array,
         good = np.linalg.norm(fitted[:, :2] - starts, axis=1) <= START_LIMIT * side
         good &= fitted[:, CONTRAST] * sites.sense > 0.0
         return good & np.all(np.isfinite(covariance), axis=(1, 2)) & (np.linalg.det(covariance) > 0.0)
-
-
-def _covered(board: BoardMap, sites: CornerSites, blur_px: float) -> tuple[Array, Array]:
-    """Ellipses (k, 2) px that no fit may use, and the map (2, 2) from px to the unit circle of one."""
-    if sites.circled is None:
-        return np.empty((0, 2)), np.eye(2)
-    return ellipses_around_circle(board, sites.circled, blur_px)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eposit.arrays import Array
+from pipelines.detection.encoding import PLAIN, Encoding
 from pipelines.detection.statuses import STATUS_TYPE, PointStatus
 
 
@@ -20,7 +21,7 @@ class Detection:
     status: NDArray[np.str_]  # (n,) PointStatus values
     finder: str  # finder that saw the board, empty if none
     blur_px: float  # median blur of the edges, NaN if none
-    exponent: float = 1.0  # of the picture's tone curve, see `tone_curve`; 1 if light was found
+    encoding: Encoding = PLAIN  # of the picture; plain if light was found
     joint_factor: Array | None = None  # (n, 2, k) px: the covariance of points i and j is f[i] @ f[j].T; NaN where the
     # status is not ok. None where the points' errors are taken for independent
 

@@ -15,12 +15,11 @@ import itertools
 import numpy as np
 from numpy.typing import NDArray
 
-from eposit.arrays import Array
 from pipelines.detection.board_map import BoardMap
 from pipelines.detection.corner_blur import edge_profiles, measured_blur
 from pipelines.detection.corner_sites import CornerSites
 from pipelines.detection.finders import Grey
-from pipelines.spread import NORMAL_MAD
+from pipelines.spread import median_with_error
 
 Light = NDArray[np.float32]  # (height, width) light, on the scale of grey values
 
@@ -32,15 +31,17 @@ LEAN = 0.03  # blurs by which a curve makes edges lean for each by which its exp
 LEAST_LEAN, SURE_LEAN = 0.25, 2.0  # of that, less so many standard errors: samples half a pixel apart show a half of it
 
 
-def decoded(image: Grey, exponent: float) -> Light:
+def decoded(image: Grey | Light, exponent: float) -> Light:
     """The light of a picture whose grey values are light^(1 / exponent), on their scale from 0 to 255."""
     if exponent == 1.0:
         return image.astype(np.float32)
+    if image.dtype != np.uint8:
+        return (255.0 * (image.astype(np.float32) / 255.0) ** exponent).astype(np.float32)
     curve = 255.0 * (np.arange(256) / 255.0) ** exponent
-    return curve.astype(np.float32)[image]
+    return curve.astype(np.float32)[image.astype(np.uint8, copy=False)]
 
 
-def measured_exponent(image: Grey, plain: Light, board: BoardMap, sites: CornerSites) -> float:
+def measured_exponent(image: Grey | Light, plain: Light, board: BoardMap, sites: CornerSites) -> float:
     """The exponent that makes black squares as large as white ones; 1 where they are so, or the larger ones.
 
     plain: the picture's light without a curve, `decoded(image, 1.0)`.
@@ -68,14 +69,7 @@ def _growth(light: Light, board: BoardMap, sites: CornerSites) -> tuple[float, f
     half = 0.5 * (profiles.shares.shape[1] - 1)
     beyond = profiles.step_px * (half - np.sum(profiles.shares, axis=1) + 0.5)
     beyond = np.where(profiles.rises, beyond, -beyond)
-    return _median(beyond)
-
-
-def _median(values: Array) -> tuple[float, float]:
-    """The median of some numbers, and its standard error."""
-    middle = float(np.median(values))
-    spread = NORMAL_MAD * float(np.median(np.abs(values - middle)))
-    return middle, spread * float(np.sqrt(0.5 * np.pi / len(values)))
+    return median_with_error(beyond)
 
 
 def _leans(plain: Light, exponent: float, board: BoardMap, sites: CornerSites) -> bool:
@@ -88,6 +82,6 @@ def _leans(plain: Light, exponent: float, board: BoardMap, sites: CornerSites) -
     low, high = shares[rows, after - 1], shares[rows, after]
     halfway = after - (high - 0.5) / np.maximum(high - low, 1e-9)
     mean = shares.shape[1] - 0.5 - np.sum(shares, axis=1)
-    lean, error = _median(profiles.step_px * np.where(profiles.rises, mean - halfway, halfway - mean))
+    lean, error = median_with_error(profiles.step_px * np.where(profiles.rises, mean - halfway, halfway - mean))
     expected = LEAN * (exponent - 1.0) * measured_blur(plain, board, sites)
     return lean + SURE_LEAN * error > LEAST_LEAN * expected

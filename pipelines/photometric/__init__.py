@@ -21,7 +21,6 @@ from eposit import Camera, Status
 from pipelines.adapters.results import PoseResult
 from pipelines.detection import PointStatus, detect_points
 from pipelines.detection.grey_picture import grey_picture
-from pipelines.detection.tone_curve import decoded
 from pipelines.photometric.refine import refine
 from render.targets import Target
 from render.targets.chessboard import Chessboard
@@ -34,7 +33,7 @@ SEPARATOR = ", "  # between the reasons of several points
 def estimate(image: NDArray[np.uint8], camera: Camera, target: Target) -> PoseResult:
     """The pose of the target in an 8-bit image (height, width), or (height, width, 3) in colour.
 
-    A tone curve that detection sees is undone first.
+    A tone curve and a sharpening that detection sees are undone first.
 
     Failures are a status: what detection says where it leaves too few points, that of the corner-based solver, or
     those of `refine`.
@@ -48,7 +47,7 @@ def estimate(image: NDArray[np.uint8], camera: Camera, target: Target) -> PoseRe
     corners = eposit.solve(target.points[good], found.points_px[good], camera, sigma_px=found.covariance_px2[good])
     if corners.status != Status.OK:
         return PoseResult(str(corners.status))
-    light = decoded(grey_picture(image), found.exponent)
+    light = found.encoding.light(grey_picture(image), found.points_px[good])
     refined = refine(light, camera, target, corners.cam_from_obj, corners.covariance, found.blur_px)
     if refined.shape is None:
         return PoseResult(refined.status, iterations=refined.iterations)

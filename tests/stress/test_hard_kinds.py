@@ -52,4 +52,4 @@ def test_a_circle_is_as_far_off_as_it_states(name):
 def test_thin_print_is_no_tone_curve(name, least, most):
     """Both make white squares grow; the curve alone makes edges lean."""
     kind = KINDS[name]
-    assert least <= detect_points(kind.shot(0).image, target_of(kind.target)).exponent <= most
+    assert least <= detect_points(kind.shot(0).image, target_of(kind.target)).encoding.exponent <= most

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from pipelines.detection import circle
 from pipelines.detection.board_map import BoardMap, grid
 from pipelines.detection.circle import find_circle
-from pipelines.detection.circle_doubt import RESIZED, at_least, beyond_the_fit, unexplained_size
+from pipelines.detection.circle_doubt import RESIZED, at_least, beyond_the_fit, moved_edges, unexplained_size
 from pipelines.detection.circle_light import fit_in_any_light
 from pipelines.detection.circle_map import CORNER_PX, FARTHER, LENS_SPREAD, prediction_covariance
 from tests.pipelines.detection import test_circle as drawing
@@ -49,8 +49,21 @@ def test_noise_in_the_edges_widths_is_not_taken_for_sharpening():
     """In a faint picture corners are unsure by 0.05 px and edges' widths by 0.2; beside sure corners this tells."""
     quiet, none = np.zeros(2), (0.0, 0.0)
     faint, seen = np.eye(2) * 0.05**2, (0.05, -0.2)
-    assert np.allclose(beyond_the_fit(quiet, faint, seen, 0.0, 15.0), beyond_the_fit(quiet, faint, none, 0.0, 15.0))
-    assert beyond_the_fit(quiet, SURE, seen, 0.0, 15.0)[0, 0] > 4.0 * beyond_the_fit(quiet, SURE, none, 0.0, 15.0)[0, 0]
+
+    def added(corners, beyond):
+        return beyond_the_fit(quiet, corners, beyond, 0.0, 0.0, 15.0)
+
+    assert np.allclose(added(faint, seen), added(faint, none))
+    assert added(SURE, seen)[0, 0] > 4.0 * added(SURE, none)[0, 0]
+
+
+def test_what_corners_show_beyond_the_circle_moves_it():
+    """Twice the circle's variance may be chance; more is a filter that a blur does not describe, up to four times."""
+    assert moved_edges(2.0, 1.0, 150.0, 0.8) == 0.0
+    assert math.isclose(moved_edges(3.0, 1.0, 150.0, 0.8), math.sqrt(2.0 * math.pi) * 0.8 / 150.0)
+    assert moved_edges(9.0, 1.0, 150.0, 0.8) == moved_edges(4.0, 1.0, 150.0, 0.8)
+    none, odd = (beyond_the_fit(np.zeros(2), SURE, (0.0, 0.0), 0.0, px, 15.0) for px in (0.0, 0.1))
+    assert np.allclose(odd - none, 0.025**2 * np.eye(2))
 
 
 def changed(board, which, by):
