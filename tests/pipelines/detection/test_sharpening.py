@@ -79,12 +79,13 @@ def test_corners_of_a_sharpened_picture_are_as_good_as_of_one_that_is_not(board)
     image, truth, _ = board
     noisy = image + np.random.default_rng(5).normal(0.0, 1.0, image.shape)
     errors, stated = [], []
-    for picture in (noisy, sharpened(noisy, 1.5, 1.0)):
+    for picture in (noisy, sharpened(noisy, 2.0, 0.8)):
         found = detect_points(np.rint(picture).astype(np.uint8), TARGET)
         good = found.status[:54] == PointStatus.OK
         assert good.all()
         errors.append(np.sqrt(np.mean((found.points_px[:54] - truth) ** 2)))
         stated.append(np.sqrt(np.mean(found.covariance_px2[:54, [0, 1], [0, 1]])))
-    # 108 coordinates tell an RMS to 7 %; sharpening spreads the noise of rounding, and its inverse gathers it again.
-    assert errors[1] < 1.3 * errors[0]
+    # The noise is the same, so that its share cancels; measured 0.95 to 1.02, and 1.4 in the sharpened picture itself.
+    assert errors[1] < 1.15 * errors[0]
+    # 108 coordinates tell an RMS to 7 %.
     assert 0.7 < errors[1] / stated[1] < 1.4
