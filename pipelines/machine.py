@@ -47,6 +47,7 @@ def provenance() -> Provenance:
     )
 
 
+@functools.cache  # each command of a process asks, and the code that it runs is that of its start
 def commit() -> str:
     """The commit of this checkout, `with changes` behind it if files differ from it; unknown without git."""
     try:

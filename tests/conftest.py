@@ -83,13 +83,22 @@ def no_report(monkeypatch):
     monkeypatch.setattr(stages, "_report", lambda dataset: None)
 
 
+@pytest.fixture
+def no_figures(monkeypatch):
+    """A report has its texts and tables alone, as its figures take seconds."""
+    for name in ("along_helix", "boxes"):
+        monkeypatch.setattr(f"pipelines.report.figures.{name}", lambda item, frames: "")
+
+
 @pytest.fixture(scope="session")
 def tiny(tmp_path_factory):
-    """The recipe's text and the folder of its finished dataset, which no test may change."""
+    """The recipe's text and the folder of its dataset with all but a report, which no test may change."""
     folder = tmp_path_factory.mktemp("tiny")
     recipe = folder / "tiny.toml"
     recipe.write_text(TINY)
-    assert command("run", recipe, "--out", folder / "dataset", "--quiet") == 0
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(stages, "_report", lambda dataset: None)  # whose figures take seconds
+        assert command("run", recipe, "--out", folder / "dataset", "--quiet") == 0
     return TINY, folder / "dataset"
 
 

@@ -6,7 +6,7 @@ Nothing here is shared with the detection or the renderer, so that a mistake of 
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import gaussian_filter
+from scipy.sparse import csr_array
 
 FINER = 10  # cells to a pixel along each side
 
@@ -19,9 +19,19 @@ def picture(grey, width, height, blur_px, finer=FINER):
     """
     around = int(np.ceil(5.0 * blur_px))
     x, y = ((np.arange((n + 2 * around) * finer) + 0.5) / finer - 0.5 - around for n in (width, height))
-    fine = gaussian_filter(grey(*np.meshgrid(x, y)), blur_px * finer, truncate=5.0, mode="nearest")
-    whole = fine.reshape(height + 2 * around, finer, width + 2 * around, finer).mean(axis=(1, 3))
-    return whole[around : around + height, around : around + width]
+    along, across = (_means(n, around, blur_px * finer, finer) for n in (height, width))
+    return along @ grey(*np.meshgrid(x, y)) @ across.T
+
+
+def _means(pixels, around, sigma, finer):
+    """Sparse (pixels, cells): the mean of a pixel's cells, each of them blurred by a gaussian cut at 5 sigma."""
+    reach = int(5.0 * sigma + 0.5)
+    weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2) if sigma else np.ones(1)
+    weights = np.convolve(weights / weights.sum(), np.full(finer, 1.0 / finer))
+    first = finer * (around + np.arange(pixels)) - reach
+    columns = first[:, None] + np.arange(len(weights))
+    rows = np.repeat(np.arange(pixels), len(weights))
+    return csr_array((np.tile(weights, pixels), (rows, columns.ravel())), (pixels, finer * (pixels + 2 * around)))
 
 
 def side(distance_px, finer=FINER):

@@ -16,6 +16,7 @@ from datasets.plan.layout import Layout, layout_of
 from datasets.plan.poses import view_of
 from datasets.recipe.cameras import CameraSpec
 from datasets.recipe.model import Recipe
+from datasets.trajectories.scatter import Scatter
 from datasets.trajectories.view import PosedFrame
 from render.motion import rolling_pose
 from render.sensor.presets import SensorModel
@@ -108,11 +109,13 @@ class _Shared:
     world: WorldDraw
     cameras: list[CameraSpec]
     sensor: SensorModel
+    fits: bool  # each camera was asked when the pose was drawn, and it does not move while a picture is read
 
 
 def _shared(recipe: Recipe, pose_id: int) -> _Shared:
     view, world = view_of(recipe, pose_id), _world(recipe, pose_id)
-    return _Shared(view, world, cameras_of(recipe, view.cam_from_obj), _sensor(recipe, view, world))
+    fits = isinstance(recipe.trajectory, Scatter) and recipe.optics.line_time_s == 0.0
+    return _Shared(view, world, cameras_of(recipe, view.cam_from_obj), _sensor(recipe, view, world), fits)
 
 
 def _frame(recipe: Recipe, frame_id: int, pose_id: int, shared: _Shared, place: int) -> Frame:
@@ -121,7 +124,7 @@ def _frame(recipe: Recipe, frame_id: int, pose_id: int, shared: _Shared, place: 
     render_seed = int(rng_for(recipe.seed, Stream.RENDER, frame_id).integers(2**32))
     sensor_seed = int(rng_for(recipe.seed, Stream.SENSOR, frame_id).integers(2**63))
     pose = rolling_pose(view.cam_from_obj, view.rate, recipe.optics.line_time_s, camera.height)
-    fault = fault_of(camera, pose, recipe)
+    fault = None if shared.fits else fault_of(camera, pose, recipe)
     if fault:
         raise UserError(f"frame {frame_id} (camera {camera.name}, t = {view.time_s:g} s): {fault}")
     where = frame_id, pose_id, view.time_s, camera, pose, view.rate

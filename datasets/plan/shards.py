@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 from datasets.plan.frame import Frame
 from datasets.plan.frames import frame_count, frames_by_number
 from datasets.recipe.model import Recipe
@@ -53,4 +55,9 @@ def frames_of_shard(recipe: Recipe, index: int) -> tuple[Frame, ...]:
         UserError: one cannot be made, as `datasets.plan.Plan` says.
     """
     chosen = frame_ids_of_shard(recipe, index)
-    return frames_by_number(recipe)[chosen.start : chosen.stop]
+    return _frames(recipe, chosen.start, chosen.stop)
+
+
+@functools.lru_cache(maxsize=2)  # whoever reads several tables of a shard holds each against the same frames
+def _frames(recipe: Recipe, start: int, stop: int) -> tuple[Frame, ...]:
+    return frames_by_number(recipe)[start:stop]

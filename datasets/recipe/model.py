@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import tomllib
@@ -9,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, field_validator, model_validator
 
@@ -162,12 +163,22 @@ class Recipe(BaseModel):
     def __hash__(self) -> int:
         return hash(self.digest())
 
+    def __copy__(self) -> Self:
+        """As `model_copy` begins, which may go on to change fields: the digest is made anew."""
+        copied = super().__copy__()
+        vars(copied).pop("_digest", None)
+        return copied
+
     def digest(self) -> str:
         """Hash of everything that decides the content; name and description do not, nor how samples are chosen.
 
         Sections that a recipe leaves out take no part, nor do later keys of its sensor, so that these do not change the
         hashes of old recipes. Of a world's file its hash counts, not its place.
         """
+        return self._digest
+
+    @functools.cached_property  # each shard that is read or written asks several times, and nothing of it can change
+    def _digest(self) -> str:
         content = self.model_dump(mode="json", exclude={"name", "description", "quality"})
         content["sensor"] = sensor_values(self.sensor)
         content |= {"samples": self.sample_count(), "target": target_values(self.target)}

@@ -112,16 +112,16 @@ def slices(measures: pa.Table) -> list[Slice]:
     keys = list(zip(*(measures[name].to_pylist() for name in KEY), strict=True))
     number = {key: i for i, key in enumerate(dict.fromkeys(keys))}
     of_row = np.array([number[key] for key in keys])
-    frame = measures["frame_id"].to_numpy()
+    frame, pose, failed = (measures[name].to_numpy(zero_copy_only=False) for name in ("frame_id", "pose_id", "failed"))
+    there = set(measures.column_names)
+    columns = {name: measures[name].to_numpy(zero_copy_only=False) for name in METRICS if name in there}
     found: list[Slice] = []
     for key, i in number.items():
         own = np.flatnonzero(of_row == i)
-        rows = measures.take(own[np.argsort(frame[own], kind="stable")])
-        values = {name: rows[name].to_numpy(zero_copy_only=False) for name in METRICS if name in rows.column_names}
+        own = own[np.argsort(frame[own], kind="stable")]
+        values = {name: column[own] for name, column in columns.items()}
         held = {name: column for name, column in values.items() if np.any(np.isfinite(column))}
-        ids = [rows[name].to_numpy() for name in ("frame_id", "pose_id")]
-        failed = rows["failed"].to_numpy(zero_copy_only=False)
-        found.append(Slice(*key, frame_id=ids[0], pose_id=ids[1], failed=failed, values=held))
+        found.append(Slice(*key, frame_id=frame[own], pose_id=pose[own], failed=failed[own], values=held))
     return found
 
 

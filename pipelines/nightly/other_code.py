@@ -134,18 +134,31 @@ def digest_of(folder: Path = ROOT, files: Sequence[Path] | None = None) -> str:
 def freeze(store: Path, folder: Path = ROOT, files: Sequence[Path] | None = None) -> Path:
     """Copy files of a folder, by default a checkout's source files, to `store`, under their digest.
 
-    A copy that is there already stays.
+    A copy that is there already stays. A checkout's gets the machine code that is known of its sources.
 
     Raises:
         UserError: the disk or its permissions refuse.
     """
     chosen = list(_files(folder) if files is None else files)
     place = store / digest_of(folder, chosen)[:16]
-    if place.is_dir():
-        return place
-    temporary = store / own_name(".tmp-")
+    if not place.is_dir():
+        _copy(folder, chosen, place)
+    if files is None:
+        from pipelines.nightly.carried_kernels import carry_kernels  # loads the compiler
+
+        carry_kernels(place)
+    return place
+
+
+def _copy(folder: Path, files: Sequence[Path], place: Path) -> None:
+    """Copy files of a folder to a new place, all or none.
+
+    Raises:
+        UserError: the disk or its permissions refuse.
+    """
+    temporary = place.with_name(own_name(".tmp-"))
     try:
-        for path in chosen:
+        for path in files:
             target = temporary / path.relative_to(folder)
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(path, target)
@@ -154,7 +167,6 @@ def freeze(store: Path, folder: Path = ROOT, files: Sequence[Path] | None = None
         shutil.rmtree(temporary, ignore_errors=True)
         if not place.is_dir():  # another process was faster
             raise UserError(f"cannot freeze the code in {place}: {error.strerror}; choose another --history") from error
-    return place
 
 
 def _files(folder: Path) -> Iterator[Path]:

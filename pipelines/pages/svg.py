@@ -22,6 +22,8 @@ STYLE: Any = {
 }
 FONT = re.compile(r"font: (?:(?P<weight>bold|\d+) )?(?P<size>[\d.]+)px [^;]*")
 
+POINTS_PER_INCH = 72  # with which SVG is drawn, so that texts are measured as they will be
+
 COLOURS = {"#000000": "currentColor"}  # of the page's text, in either theme
 
 
@@ -32,6 +34,7 @@ def svg(figure: Figure) -> str:
     figures on one page may not be equal.
     """
     buffer = io.StringIO()
+    _lay_out(figure)
     figure.savefig(buffer, format="svg", metadata={"Date": None}, transparent=True)
     plt.close(figure)
     text = re.sub(r"^.*?(?=<svg)", "", buffer.getvalue(), flags=re.S)
@@ -40,6 +43,15 @@ def svg(figure: Figure) -> str:
     text = re.sub(r'^<svg [^>]*?(viewBox="[^"]*")[^>]*>', r'<svg class="drawing" aria-hidden="true" \1>', text)
     text = text.replace("xlink:href", "href").replace("<defs></defs>", "").replace("<defs/>", "")
     return _named_apart(text)
+
+
+def _lay_out(figure: Figure) -> None:
+    """Place the axes, once and for all: with a layout left to do, `savefig` draws all twice."""
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        figure.set_dpi(POINTS_PER_INCH)
+        engine.execute(figure)
+        figure.set_layout_engine(None)
 
 
 def _attributes(style: str) -> str:

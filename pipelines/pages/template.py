@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import functools
 import hashlib
 from pathlib import Path
 
@@ -20,6 +21,11 @@ def rendered(template: Path, **values: object) -> str:
 
     A style sheet of the template's name beside it is added to the shared one.
     """
+    return _compiled(template).render(**values)
+
+
+@functools.cache  # a night writes its page several times, and compiling takes longer than filling in
+def _compiled(template: Path) -> jinja2.Template:
     environment = jinja2.Environment(
         loader=jinja2.ChoiceLoader([jinja2.FileSystemLoader(template.parent), jinja2.FileSystemLoader(FOLDER)]),
         autoescape=True,
@@ -37,7 +43,7 @@ def rendered(template: Path, **values: object) -> str:
         "share": numbers.share,
     }
     environment.tests["drawing"] = lambda item: isinstance(item, Drawing)
-    return environment.get_template(template.name).render(**values)
+    return environment.get_template(template.name)
 
 
 def _policy(style: str, script: str) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
@@ -54,9 +56,14 @@ def helix(step: float = 1.0) -> Pose:
     return poses_on(Helix(point="origin", step=step))
 
 
+@functools.lru_cache(maxsize=8)  # each part and claim begins with them
 def poses_on(path: Helix) -> Pose:
-    """A helix's poses of the paper's board, one for each of its times."""
-    return stacked([path.cam_from_obj(time, Chessboard()) for time in path.times()])
+    """A helix's poses of the paper's board, one for each of its times; nobody may write into them."""
+    board = Chessboard()
+    poses = stacked([path.cam_from_obj(time, board) for time in path.times()])
+    for values in (poses.R, poses.t):
+        values.flags.writeable = False
+    return poses
 
 
 def taken(pose: Pose, order: NDArray[np.intp]) -> Pose:

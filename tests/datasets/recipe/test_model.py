@@ -157,6 +157,14 @@ def test_a_regime_is_put_into_a_recipe_as_if_it_had_been_written(sensor):
         assert recipe.model_copy(update={"sensor": regimes()["clean"]}).digest() == load_recipe("smoke")[0].digest()
 
 
+def test_a_digest_that_has_been_asked_for_is_the_recipes_alone():
+    recipe = load_recipe("smoke")[0]
+    digest = recipe.digest()
+    assert recipe == load_recipe("smoke")[0]  # which has not been asked
+    changed = recipe.model_copy(update={"seed": recipe.seed + 1})
+    assert changed.digest() != digest == recipe.digest() == recipe.model_copy().digest()
+
+
 def test_comments_stay_when_a_regime_is_put_in():
     for sensor in ("", "[sensor]  # dark\n# how dark\ngamma = 2.2  # bright\n", "sensor = { gamma = 2.2 }  # short\n"):
         top, rest = (sensor, "") if "{" in sensor else ("", sensor)

@@ -256,6 +256,7 @@ def test_a_lock_file_is_gone_when_its_process_is(tmp_path):
     assert state_of(tmp_path / f"{LOCK_PREFIX}{atomic.host()}-1-{'0' * 16}") is atomic.State.GONE
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_a_stage_beside_a_writer_is_refused_and_readers_are_not(root, cli):
     with hold(root):
         for words in (("detect",), ("estimate",), ("score",)):

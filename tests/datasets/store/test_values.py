@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -63,27 +61,21 @@ CASES = {
 }
 
 
-@pytest.fixture
-def copy(tiny, tmp_path):
-    shutil.copytree(tiny[1], tmp_path / "dataset")
-    return tmp_path / "dataset"
-
-
 def place_of(root, table):
     return root / table / ONE if table in ("estimates", "scores") else first(root, table)
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_a_doctored_shard_is_refused(name, copy):
+def test_a_doctored_shard_is_refused(name, root):
     table, change, words = CASES[name]
-    path = place_of(copy, table)
+    path = place_of(root, table)
     if name == "no picture":
         rows = pq.read_table(path).replace_schema_metadata(None)
         footer = {key.decode(): value.decode() for key, value in pq.read_metadata(path).metadata.items()}
         write(path, change(rows), footer)
     else:
         doctor(path, change)
-    dataset = open_dataset(copy)
+    dataset = open_dataset(root)
     with pytest.raises(
         UserError, match=f"{path.name} is damaged: .*{words}" if name != "no picture" else "is damaged: "
     ):
@@ -91,29 +83,29 @@ def test_a_doctored_shard_is_refused(name, copy):
     assert path in [problem.path for problem in verify(dataset)[1]]
 
 
-def test_two_detectors_in_one_shard(copy):
-    path = first(copy, "detections")
+def test_two_detectors_in_one_shard(root):
+    path = first(root, "detections")
     doctor(path, lambda rows: pa.concat_tables([rows.slice(0, 9), column("detector", "x")(rows.slice(9))]))
     with pytest.raises(UserError, match="its rows are of another detector than its name tells"):
-        open_dataset(copy).read_shard(path)
+        open_dataset(root).read_shard(path)
 
 
 @pytest.mark.parametrize("of_text", [True, False])
-def test_a_small_file_that_unpacks_to_gigabytes_is_not_unpacked(of_text, copy):
-    path = place_of(copy, "estimates")
+def test_a_small_file_that_unpacks_to_gigabytes_is_not_unpacked(of_text, root):
+    path = place_of(root, "estimates")
     footer = {key.decode(): value.decode() for key, value in pq.read_metadata(path).metadata.items()}
     write_bomb(path, TABLES["estimates"], footer, of_text)
     assert path.stat().st_size < 1_000_000
     before = pa.total_allocated_bytes()
     with pytest.raises(UserError, match=r"a text of more than 4000 bytes|rows, and 1 are planned"):
-        open_dataset(copy).read_shard(path)
+        open_dataset(root).read_shard(path)
     assert pa.total_allocated_bytes() - before < 10_000_000
 
 
-def test_encodings_that_hold_more_than_their_size_are_refused(copy):
-    path = place_of(copy, "scores")
+def test_encodings_that_hold_more_than_their_size_are_refused(root):
+    path = place_of(root, "scores")
     rows = pq.read_table(path)
     options = {"use_dictionary": False, "column_encoding": {"status": "DELTA_BYTE_ARRAY"}}
     pq.write_table(rows, path, **options)
     with pytest.raises(UserError, match="its status is stored as this program never does"):
-        open_dataset(copy).read_shard(path)
+        open_dataset(root).read_shard(path)

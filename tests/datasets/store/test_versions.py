@@ -95,6 +95,7 @@ def test_old_estimates_are_scored_as_today(both, cli):
     assert cli("verify", old).code == 0
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_shards_of_both_versions_stand_beside_each_other(both, cli):
     _, old = both
     first(old, "scores").unlink()

@@ -131,6 +131,7 @@ def test_the_command_stays_below_200_mb():
 
 
 @pytest.mark.full
+@pytest.mark.usefixtures("no_report")
 def test_what_is_measured_is_what_a_run_takes(cli, own_cache, tmp_path):
     recipe = tmp_path / "tiny.toml"
     recipe.write_text(TINY.replace("step = 90", "step = 3").replace("shard_frames = 1", "shard_frames = 31"))

@@ -76,13 +76,17 @@ def sky(distance):
 def lamp(x, y, lamp=LAMP):
     """Share of a square lamp that is not hidden: shadows of 9 x 9 points."""
     steps = ((np.arange(9) + 0.5) / 9.0 - 0.5) * LAMP_SIDE
-    total = np.zeros_like(x)
+    share = HEIGHT / lamp[2]  # of the way to the lamp, at which its ray crosses the disc's plane
+    farthest = (RADIUS + share * (np.hypot(*(lamp[:2] - AT)) + LAMP_SIDE)) / (1.0 - share)  # that a shadow may lie
+    near = np.hypot(x - AT[0], y - AT[1]) < farthest
+    x, y = x[near], y[near]
+    total, shares = np.zeros_like(x), np.ones(near.shape)
     for dx in steps:
         for dy in steps:
-            share = HEIGHT / lamp[2]  # of the way to the lamp, at which its ray crosses the disc's plane
             u, v = x + share * (lamp[0] + dx - x), y + share * (lamp[1] + dy - y)
             total += (u - AT[0]) ** 2 + (v - AT[1]) ** 2 >= RADIUS**2
-    return total / 81.0
+    shares[near] = total / 81.0
+    return shares
 
 
 def board_with(name, disc=DISC, moved=0.0, lamps=(LAMP,)):

@@ -229,6 +229,7 @@ def test_an_unknown_detector_is_named_with_the_known_ones(demo):
         detect_points(demo[0][1], TARGET, "ours")
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_detectors_lie_side_by_side_in_one_dataset(tiny, tmp_path, cli, content):
     root = tmp_path / "dataset"
     shutil.copytree(tiny[1], root)

@@ -1,12 +1,16 @@
 """The baseline's code: a frozen copy runs, and nothing else answers in its place."""
 
 import shutil
+from pathlib import Path
 
 import pytest
 
 from datasets.store.dataset import open_dataset
 from datasets.verify import verify
-from pipelines.nightly.other_code import ROOT, Code, OtherCodeError, digest_of, freeze
+from pipelines.detection.prepare import compile_kernels
+from pipelines.nightly.other_code import CHOOSE_CODE, ROOT, Code, OtherCodeError, digest_of, freeze
+
+KERNELS = Path("pipelines", "detection", "__pycache__")
 
 
 @pytest.fixture(scope="module")
@@ -72,3 +76,27 @@ def test_the_same_files_have_one_copy(tmp_path):
     assert first == second
     assert digest_of(first) == digest_of(ROOT)
     assert [path.name for path in tmp_path.iterdir()] == [first.name]
+
+
+COUNT_COMPILED = """
+from pipelines.detection.prepare import compile_kernels
+found = []
+compile_kernels(lambda: found.append(1))
+print(len(found))
+"""
+
+
+def test_a_copy_need_not_compile_what_this_checkout_has_compiled(tmp_path):
+    compile_kernels()
+    code = Code(freeze(tmp_path))
+    assert int(code.run_program(CHOOSE_CODE + COUNT_COMPILED, what="count").stdout) == 0
+
+
+def test_machine_code_of_other_sources_is_not_carried(frozen, tmp_path):
+    changed = tmp_path / "changed"
+    shutil.copytree(frozen, changed, ignore=shutil.ignore_patterns("__pycache__"))
+    compile_kernels()
+    assert (freeze(tmp_path / "same", changed) / KERNELS).is_dir()
+    with open(changed / "pipelines" / "detection" / "levels.py", "a") as file:
+        file.write("# another\n")
+    assert not (freeze(tmp_path / "other", changed) / KERNELS).exists()

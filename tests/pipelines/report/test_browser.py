@@ -17,10 +17,9 @@ SETTINGS = "#poses-table > tbody:not(.out) > tr > th"
 
 
 @pytest.fixture
-def visit(visiting, tiny):
+def visit(visiting, reported):
     """Open the report of two frames."""
-    _, root = tiny
-    return functools.partial(visiting, root / REPORT)
+    return functools.partial(visiting, reported / REPORT)
 
 
 def _settings(page):
@@ -70,10 +69,10 @@ def test_a_row_opens_to_every_component(visit):
     assert not detail.is_visible()
 
 
-def test_a_frame_opens_large_and_its_command_names_the_folder(visit, tiny):
+def test_a_frame_opens_large_and_its_command_names_the_folder(visit, reported):
     page = visit().page
     for code in page.locator(".command").all():
-        assert f" frame {tiny[1]} " in code.inner_text()
+        assert f" frame {reported} " in code.inner_text()
     small = page.locator("section[aria-labelledby=worst] .sides svg").first.bounding_box()
     page.locator("section[aria-labelledby=worst] .sides").first.click()
     dialog = page.locator("dialog")
@@ -152,9 +151,9 @@ def test_paper_shows_what_is_folded_away(visit):
     assert page.locator("details[open]").count() == 1
 
 
-def test_without_the_script_everything_can_be_read(browser, tiny):
+def test_without_the_script_everything_can_be_read(browser, reported):
     context = browser.new_context(java_script_enabled=False)
     page = context.new_page()
-    page.goto((tiny[1] / REPORT).as_uri())
+    page.goto((reported / REPORT).as_uri())
     assert page.locator("#poses-table .detail:visible").count() == 5
     assert page.locator("button:visible").count() == 0

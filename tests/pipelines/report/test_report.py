@@ -15,9 +15,8 @@ from pipelines.report.points import point_errors
 from tests.pipelines.pages.parsed import Page, assert_named_for_a_screen_reader
 
 
-def test_report_is_one_file_without_the_network(tiny):
-    _, root = tiny
-    text = (root / REPORT).read_text()
+def test_report_is_one_file_without_the_network(reported):
+    text = (reported / REPORT).read_text()
     page = Page(text)
     addresses = [item.attributes[name] for item in page.all for name in ("href", "src") if name in item.attributes]
     assert all(address.startswith(("#", "data:image/jpeg;base64,")) for address in addresses)
@@ -35,13 +34,12 @@ def test_equal_data_give_equal_bytes(root):
     assert first == second
 
 
-def test_everything_has_a_name_for_a_screen_reader(tiny):
-    _, root = tiny
-    assert_named_for_a_screen_reader(Page((root / REPORT).read_text()))
+def test_everything_has_a_name_for_a_screen_reader(reported):
+    assert_named_for_a_screen_reader(Page((reported / REPORT).read_text()))
 
 
-def test_frames_are_shown_with_what_makes_them_again(tiny, cli, tmp_path):
-    _, root = tiny
+def test_frames_are_shown_with_what_makes_them_again(reported, cli, tmp_path):
+    root = reported
     page = Page((root / REPORT).read_text())
     usual, worst = page.of("ul", "frames")
     assert len(page.inside(usual, "li")) == 1  # one of each camera

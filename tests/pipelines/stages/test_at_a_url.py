@@ -68,6 +68,7 @@ def test_what_is_no_place_for_a_dataset_is_told():
             dataset_folder(text)
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_every_stage_works_at_a_url(root, stored, tiny, content):
     execution = Execution(LocalEngine(), Console(quiet=True))
     put(root, stored, ["frames", "masters"])

@@ -11,6 +11,7 @@ from tests.own import image_rows
 
 
 @pytest.mark.full
+@pytest.mark.usefixtures("no_figures")
 def test_photometric_and_the_bound_come_out_in_tables_and_report(root, cli, content):
     for words in (("estimate", root, "--estimator", "photometric"), ("bound", root), ("score", root)):
         assert cli(*words, "-q").code == 0

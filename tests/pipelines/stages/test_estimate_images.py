@@ -24,6 +24,7 @@ def toy():
     return EXAMPLE.read_text()
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_the_example_estimator_comes_out_in_tables_and_report(own, root, cli):
     name = f"{own(toy())}:estimate"
     assert cli("estimate", root, "--estimator", name, "-q").code == 0
@@ -130,6 +131,7 @@ def test_failures_of_a_system_are_rows(own, root, cli):
     assert f"{name}:never image exact all failed in 2 of 2 estimates: 2 no_solution." in text
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_a_system_needs_no_detections(own, root, cli):
     for table in ("detections", "estimates", "scores"):
         shutil.rmtree(root / table)

@@ -123,6 +123,7 @@ def rescored(root, cli):
     return row["status"], row["failure_reason"], row["gross_failure"]
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_a_pose_of_a_hidden_target_is_made_up(root, cli):
     dataset, count = open_dataset(root), len(open_dataset(root).recipe.target.points)
     hide(dataset, range(4, count))  # four points are left: a pose can be made

@@ -33,6 +33,7 @@ colour = true
 
 
 @pytest.mark.full
+@pytest.mark.usefixtures("no_report")
 def test_workers_and_resuming_change_no_bit(tmp_path, cli, content):
     recipe, one, two = tmp_path / "tiny.toml", tmp_path / "one", tmp_path / "two"
     recipe.write_text(RECIPE)

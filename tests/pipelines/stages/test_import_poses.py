@@ -85,6 +85,7 @@ def test_poses_of_a_file_are_scored(suffix, form, poses, root, tmp_path, cli):
         np.testing.assert_allclose([score[f"t{axis}_error_mm"] for axis in "xyz"], 1.0, atol=1e-9)
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_they_stand_in_the_report_beside_the_others(poses, root, tmp_path, cli, content):
     path = write(tmp_path / "poses.csv", poses)
     words = ("score", root, "--poses", path, "--name", "theirs", "--camera", "nominal", "-q")

@@ -21,6 +21,7 @@ def bare(place, cli):
     return recipe, root
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_the_content_is_that_of_a_dataset_with_them(place, bare, cli, content):
     recipe, root = bare
     assert masters(root) == []
@@ -97,6 +98,7 @@ def test_a_run_that_was_killed_before_its_first_frame_goes_on_without(place, cli
 
 
 @pytest.mark.full
+@pytest.mark.usefixtures("no_report")
 def test_run_takes_the_option_too(place, cli):
     assert cli("run", place.recipe(), "--out", place.new(), "--no-masters", "-q").code == 0
     assert masters(place.new()) == []

@@ -77,7 +77,7 @@ def test_optics_decide_content_and_light_only_where_they_are_asked_for(made, tin
 def test_a_rolling_picture_has_the_same_bits_by_two_workers(made, tiny, tmp_path, content):
     recipe, root = tmp_path / "recipe.toml", made[1]
     recipe.write_text(tiny[0].replace("stop = 90\nstep = 90", HAND) + ROLLING)
-    assert command("run", recipe, "--out", tmp_path / "two", "--workers", 2, "-q") == 0
+    assert command("generate", recipe, "--out", tmp_path / "two", "--workers", 2, "-q") == 0
     frames = [open_dataset(folder).read("frames") for folder in (root, tmp_path / "two")]
     assert frames[0].equals(frames[1])
 

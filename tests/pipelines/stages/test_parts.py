@@ -17,7 +17,7 @@ from tests.conftest import command
 from tests.timeless import timeless
 from tests.wrong_input import assert_one_sentence, files
 
-MADE = ("recipe.toml", "manifest.json", "README.md", "report.html")
+MADE = ("recipe.toml", "manifest.json", "README.md")
 STAGES = ("detect", "estimate", "score")
 
 
@@ -88,9 +88,10 @@ def test_four_processes_at_once_and_then_the_report(four, tmp_path, cli, content
     assert [part.wait(120) for part in parts] == [0] * 4
     assert not (root / "manifest.json").exists()
     assert cli("report", root).code == 0
-    assert_equal(root, source, content)
+    assert_equal(root, source, content, (*MADE, "report.html"))
 
 
+@pytest.mark.usefixtures("no_report")
 def test_stages_in_parts_in_any_order_and_a_plain_run_completes(two, tmp_path, cli, content):
     recipe, source = two
     root = tmp_path / "dataset"
@@ -139,6 +140,7 @@ def test_parts_share_a_folder_and_a_plain_command_does_not_join_them(root, cli):
         assert_one_sentence(refused.code, refused.err, "is being written by")
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_the_report_lists_what_parts_have_made_unless_somebody_still_writes(root, cli):
     (root / "manifest.json").unlink()
     with hold(root, shared=True):

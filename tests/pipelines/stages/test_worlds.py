@@ -152,6 +152,7 @@ def test_the_closed_form_has_nulls(tiny):
 
 
 @pytest.mark.full
+@pytest.mark.usefixtures("no_report")
 def test_a_target_that_is_not_there_is_no_failure(made, tmp_path, cli):
     recipe = tmp_path / "absent.toml"
     recipe.write_text(made[0].read_text().replace("occluders = [1, 1]", "absent_share = 1.0"))
