@@ -74,9 +74,9 @@ def faults(found):
         said.append(f"normalised error {own.normalised:.2f}")
     said += _faults_of_circles(figures(found[OURS], "disc"))
     for detector in found.keys() - {OURS}:
-        other = figures(found[detector])
-        if other.found > own.found:
-            said.append(f"found {own.found:.3f}, {detector} {other.found:.3f}")
+        other, there = figures(found[detector]), figures({view: found[OURS][view] for view in found[detector]})
+        if other.found > there.found:
+            said.append(f"found {there.found:.3f}, {detector} {other.found:.3f} in the same pictures")
         rms, others = shared_rms(found[OURS], found[detector])
         if rms > ALLOWANCE * others:
             said.append(f"RMS {rms:.4f} px, {detector} {others:.4f} px on the same pictures")
