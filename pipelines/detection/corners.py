@@ -11,7 +11,7 @@ from eposit.arrays import Array, Mask
 from pipelines.detection.board_map import BoardMap, normal_angles
 from pipelines.detection.circle_shade import without_shade
 from pipelines.detection.circle_surroundings import ellipses_around_circle
-from pipelines.detection.consistency import Corners, drop_inconsistent, hold_of
+from pipelines.detection.consistency import Corners, drop_inconsistent
 from pipelines.detection.corner_blur import measured_blur, widths_beyond
 from pipelines.detection.corner_model import fit_corners
 from pipelines.detection.corner_picture import BLUR, CONTRAST, MEAN, SHAPE, SLOPE, CornerTask
@@ -21,6 +21,7 @@ from pipelines.detection.edge_form_errors import FORM_SHARE, form_errors
 from pipelines.detection.encoding import PLAIN, measured_encoding
 from pipelines.detection.finders import Grey
 from pipelines.detection.hot_pixels import without_hot_pixels
+from pipelines.detection.next_map import form_reach, next_map
 from pipelines.detection.row_moves import RowMoves, row_moves
 from pipelines.detection.time_limit import Check, unlimited
 from pipelines.detection.tone_curve import Light, decoded
@@ -40,8 +41,8 @@ MOST_LOST = 0.5  # of the corners
 LEAST_CONTRAST = 0.2  # of the board's: a corner in a shadow has it, a covered one has not
 PLAIN_NOISE = 4.0  # of the board's median variance: twice the deviation, which no corner's own scatter reaches
 SHADOW_PX, SHADOW_BLURS, FARTHEST_SHADOW_PX = 10.0, 3.5, 30.0  # radius of the window that shows a shadow's edge
+LEAST_KEPT = 0.9  # of the corners: a motion of the rows loses none
 FEW = 24  # corners that hardly tell a map's parameters: they are fitted again from the better map
-MISFIT_NOISE = 4.0  # mean squares of a corner's uncertainty that its distance from a good map may have
 
 
 class _Pass(NamedTuple):
@@ -83,7 +84,7 @@ def refine_corners(
         good = corners.consistent
         if np.mean(~good) > MOST_LOST:
             return corners
-        board = _next_map(corners, board, at, size)
+        board = next_map(corners, board, at, size)
         if encoding is None:
             encoding = measured_encoding(image, board, sites, corners.blur_px)
             light = light if encoding == PLAIN else encoding.light(image, board(at))
@@ -92,18 +93,22 @@ def refine_corners(
                 corners, shapes, _ = _fit(light, board, sites, starts, NEAR)
             if sites.circled is not None:
                 light = without_shade(light, board, sites.circled, corners.blur_px)
-        limits = FINAL._replace(reach=_form_reach(corners, board, at))
+        limits = FINAL._replace(reach=form_reach(corners, board, at))
         corners, shapes, _ = _fit(light, board, sites, _next_shapes(corners, shapes, board, at), limits)
     good = corners.consistent
     moves = row_moves(at[good], corners.points_px[good], corners.covariance_px2[good], board)
     if moves is not None:
         still = corners.points_px - moves(corners.points_px[:, 1])
-        board = _next_map(replace(corners, points_px=still), board, at, size)
-        limits = limits._replace(moves=moves)
-        corners, shapes, _ = _fit(light, board, sites, _next_shapes(corners, shapes, board, at), limits)
+        through = next_map(replace(corners, points_px=still), board, at, size)
+        moved, starts = limits._replace(moves=moves), _next_shapes(corners, shapes, through, at)
+        again, _, _ = _fit(light, through, sites, starts, moved)
+        if np.sum(again.consistent) < LEAST_KEPT * np.sum(good):
+            moves = None  # what seemed to move rows moves edges otherwise
+        else:
+            corners, board, limits = again, through, moved
     corners = replace(corners, encoding=encoding or PLAIN)
     if np.mean(~corners.consistent) <= MOST_LOST:
-        corners = replace(corners, board=_next_map(corners, corners.board, at, size))
+        corners = replace(corners, board=next_map(corners, corners.board, at, size))
         beyond = widths_beyond(light, corners.board, sites, corners.blur_px)
         corners = replace(corners, widths_beyond_px=(float(beyond[0]), float(beyond[1])))
         sites, corners = _with_nearby(light, sites, unseen, corners)
@@ -161,35 +166,6 @@ def _with_places_for(corners: Corners, more: int) -> Corners:
         covariance_px2=np.concatenate((corners.covariance_px2, np.full((more, 2, 2), np.nan))),
         consistent=np.append(corners.consistent, np.zeros(more, bool)),
     )
-
-
-def _next_map(corners: Corners, board: BoardMap, at: Array, size: tuple[int, int]) -> BoardMap:
-    """The map through the corners; where it misses them, that from starts of its own, if it is better.
-
-    A first map is made from corners that are good to a pixel, and holds the lens to a usual one.
-    """
-    weights, points = corners.consistent * 1.0, corners.points_px
-    hold = hold_of(corners.covariance_px2, corners.consistent)
-    near = BoardMap.fit(at, points, size, weights, board, hold)
-    misfit, own = _misfit(corners, near, at)
-    if misfit <= own:
-        return near
-    anew = BoardMap.fit_from_everywhere(at, points, size, weights, hold, board.lift)
-    return anew if _misfit(corners, anew, at)[0] < misfit else near
-
-
-def _misfit(corners: Corners, board: BoardMap, at: Array) -> tuple[float, float]:
-    """Median squared distance, px^2, of the corners from a map, and what their own uncertainty makes of it."""
-    good = corners.consistent
-    misfit = np.median(np.sum((corners.points_px - board(at))[good] ** 2, axis=1))
-    return float(misfit), float(np.median(np.trace(corners.covariance_px2[good], axis1=1, axis2=2)))
-
-
-def _form_reach(corners: Corners, board: BoardMap, at: Array) -> float:
-    """Squares along an edge up to which its form, as the map has it, is good to the corners' uncertainty."""
-    misfit, own = _misfit(corners, board, at)
-    excess = max(misfit - MISFIT_NOISE * own, 0.0)
-    return (own / (FORM_SHARE**2 * excess + 1e-12)) ** 0.25
 
 
 def _next_shapes(corners: Corners, shapes: Array, board: BoardMap, at: Array) -> Array:
