@@ -74,7 +74,7 @@ def detect_chessboard(image: Grey, target: Chessboard, detector: str, check_time
     if is_of_another_size(light, corners, at, target):
         return nothing(count, PointStatus.OTHER_BOARD, seen.finder)
     motion = motion_blur(light, corners.board, chessboard_sites(target).chosen(ids[corners.consistent]))
-    circle = find_circle(light, corners, at, target, misfit, motion)
+    circle = find_circle(corners.encoding.with_clipped(light, image), corners, at, target, misfit, motion)
     points, covariance = np.full((count, 2), np.nan), np.full((count, 2, 2), np.nan)
     status = np.full(count, PointStatus.POINT_NOT_FOUND, STATUS_TYPE)
     good = ids[corners.consistent]

@@ -86,8 +86,7 @@ def refine_corners(
             return corners
         board = next_map(corners, board, at, size)
         if encoding is None:
-            encoding = measured_encoding(image, board, sites, corners.blur_px)
-            light = light if encoding == PLAIN else encoding.light(image, board(at))
+            encoding, light = measured_encoding(image, light, board, sites, corners.blur_px)
             if encoding.sharpening is not None:
                 starts = _start_shapes(board, at, measured_blur(light, board, sites))
                 corners, shapes, _ = _fit(light, board, sites, starts, NEAR)

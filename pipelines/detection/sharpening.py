@@ -25,7 +25,7 @@ from pipelines.spread import median_with_error
 
 NARROWER = 0.15  # px by which edges along both axes must be narrower than their slopes say: noise in ordinary pictures
 # shows 0.1
-AMOUNTS, COPIES_PX = (0.0, 4.0), (0.5, 3.0)  # what cameras and their users set
+AMOUNTS, COPIES_PX = (0.0, 4.0), (0.5, 6.0)  # what cameras and their users set
 START = 0.5, 1.0
 NEAR_BLURS, NEAR_PX = 6.0, 2.0  # of the middle of an edge: what is fitted
 OUTLIERS = 0.03  # of black to white: noise and JPEG change less
@@ -33,8 +33,8 @@ OVERSHOOT, SURE = 0.015, 3.0  # of black to white: what a sharpened edge goes be
 # JPEG shows 0.011, and noise less than these errors
 BINS_PX = np.arange(0.5, 8.5, 0.5)  # from an edge, in which this is looked for
 LEAST_SAMPLES = 20  # in one
-KERNEL_PX = 8  # to each side: the inverse filter falls to 1e-4 within
-TRANSFORM = 64  # samples of a filter's transform along each axis
+KERNEL_PX, KERNEL_COPIES = 4, 4.0  # to each side: px, and copies' blurs; a hundredth of the inverse filter lies beyond
+TRANSFORM = 128  # samples of a filter's transform along each axis
 BEYOND = 0.35  # of the extent of the board's corners: what lies around them is put back, too
 
 
@@ -95,16 +95,17 @@ def _edge(x: Array, variance: float) -> Array:
 
 
 def without_sharpening(image: Light, sharpening: Sharpening, around: Array) -> Light:
-    """A picture before it was sharpened, where the board is; elsewhere, and where it is clipped, it stays.
+    """A picture before it was sharpened, where the board is; elsewhere it stays.
 
     around: (n, 2) px, places of the board.
     """
     height, width = image.shape
-    margin = 2.0 * KERNEL_PX + BEYOND * np.ptp(around, axis=0).max()
+    filter_ = _inverse_filter(sharpening)
+    margin = len(filter_) + BEYOND * np.ptp(around, axis=0).max()
     x0, y0 = np.clip(np.floor(around.min(axis=0) - margin), 0, (width, height)).astype(int)
     x1, y1 = np.clip(np.ceil(around.max(axis=0) + margin), 0, (width, height)).astype(int)
     part = image[y0:y1, x0:x1]
-    before = cv2.filter2D(part, cv2.CV_32F, _inverse_filter(sharpening), borderType=cv2.BORDER_REFLECT_101)
+    before = cv2.filter2D(part, cv2.CV_32F, filter_, borderType=cv2.BORDER_REFLECT_101)
     out = image.copy()
     out[y0:y1, x0:x1] = np.clip(before, 0.0, 255.0)
     return out
@@ -115,6 +116,7 @@ def _inverse_filter(sharpening: Sharpening) -> Light:
     frequency = 2.0 * np.pi * np.fft.fftfreq(TRANSFORM)
     copy = np.exp(-0.5 * sharpening.px**2 * (frequency[:, None] ** 2 + frequency**2))
     kernel = np.fft.fftshift(np.fft.ifft2(1.0 / (1.0 + sharpening.amount * (1.0 - copy))).real)
-    middle = slice(TRANSFORM // 2 - KERNEL_PX, TRANSFORM // 2 + KERNEL_PX + 1)
+    reach = KERNEL_PX + math.ceil(KERNEL_COPIES * sharpening.px)
+    middle = slice(TRANSFORM // 2 - reach, TRANSFORM // 2 + reach + 1)
     kernel = kernel[middle, middle]
     return (kernel / kernel.sum()).astype(np.float32)

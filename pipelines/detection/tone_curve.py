@@ -41,7 +41,7 @@ def decoded(image: Grey | Light, exponent: float) -> Light:
     return curve.astype(np.float32)[image.astype(np.uint8, copy=False)]
 
 
-def measured_exponent(image: Grey | Light, plain: Light, board: BoardMap, sites: CornerSites) -> float:
+def measured_exponent(image: Grey, plain: Light, board: BoardMap, sites: CornerSites) -> float:
     """The exponent that makes black squares as large as white ones; 1 where they are so, or the larger ones.
 
     plain: the picture's light without a curve, `decoded(image, 1.0)`.

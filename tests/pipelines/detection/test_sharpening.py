@@ -9,6 +9,7 @@ from pipelines.detection.board_map import BoardMap
 from pipelines.detection.corner_sites import chessboard_sites
 from pipelines.detection.encoding import PLAIN, measured_encoding
 from pipelines.detection.sharpening import Sharpening, measured_sharpening, without_sharpening
+from pipelines.detection.tone_curve import decoded
 from tests.pipelines.detection.test_finders import CORNERS, TARGET, drawn
 from tests.pipelines.detection.test_tone_curve import encoded
 
@@ -63,14 +64,17 @@ def test_noise_and_rounding_are_none(board):
     image, _, of_corners = board
     picture = np.rint(image + np.random.default_rng(3).normal(0.0, 8.0, image.shape)).astype(np.float32)
     assert measured_sharpening(picture, of_corners, SITES, BLUR_PX) is None
-    assert measured_encoding(np.rint(image).astype(np.uint8), of_corners, SITES, BLUR_PX) == PLAIN
+    grey = np.rint(image).astype(np.uint8)
+    assert measured_encoding(grey, decoded(grey, 1.0), of_corners, SITES, BLUR_PX)[0] == PLAIN
 
 
 def test_a_tone_curve_is_seen_through_a_sharpening(board):
     """Undone first, as it came last. The exponent alone is told to 0.03; what is left of the filter adds to that."""
     image, _, of_corners = board
     picture = sharpened(encoded(image, 2.2), 1.0, 1.0)
-    found = measured_encoding(np.rint(picture).astype(np.uint8), of_corners, SITES, 0.5)
+    grey = np.rint(picture).astype(np.uint8)
+    found, light = measured_encoding(grey, decoded(grey, 1.0), of_corners, SITES, 0.5)
+    np.testing.assert_array_equal(light, found.light(grey, of_corners(SITES.at)))
     assert found.exponent == pytest.approx(2.2, abs=0.3)
     assert found.sharpening is not None
 
@@ -89,3 +93,17 @@ def test_corners_of_a_sharpened_picture_are_as_good_as_of_one_that_is_not(board)
     assert errors[1] < 1.15 * errors[0]
     # 108 coordinates tell an RMS to 7 %.
     assert 0.7 < errors[1] / stated[1] < 1.4
+
+
+def test_clipped_pixels_stay_clipped_for_the_circle(board):
+    """What halos lack that were cut off comes back with no filter: read as light, they moved circles by 0.2 px."""
+    image, _, of_corners = board
+    grey = np.rint(sharpened(1.4 * image, 1.5, 1.0)).astype(np.uint8)
+    found, light = measured_encoding(grey, decoded(grey, 1.0), of_corners, SITES, 0.5)
+    clipped = grey == 255
+    assert found.sharpening is not None
+    assert np.mean(light[clipped] < 254.5) > 0.1
+    marked = found.with_clipped(light, grey)
+    assert np.all(marked[clipped] == 255.0)
+    np.testing.assert_array_equal(marked[~clipped], light[~clipped])
+    assert PLAIN.with_clipped(light, grey) is light
