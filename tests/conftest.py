@@ -102,6 +102,15 @@ def tiny(tmp_path_factory):
     return TINY, folder / "dataset"
 
 
+@pytest.fixture(scope="session")
+def reported(tiny, tmp_path_factory):
+    """The folder of the dataset with a report of all its kinds of estimates, which no test may change."""
+    root = tmp_path_factory.mktemp("reported") / "dataset"
+    shutil.copytree(tiny[1], root)
+    assert command("report", root) == 0
+    return root
+
+
 @pytest.fixture
 def root(tiny, tmp_path):
     """The tiny dataset with one kind of estimate, as every kind's figures take time."""

@@ -93,15 +93,15 @@ def test_a_slurm_array_runs_every_part_and_then_the_report(stand_ins, tmp_path, 
 
 
 @pytest.mark.full
-def test_a_slurm_array_makes_the_dataset(tiny, tmp_path, stand_ins, monkeypatch, content):
+def test_a_slurm_array_makes_the_dataset(tiny, reported, tmp_path, stand_ins, monkeypatch, content):
     monkeypatch.setenv("PYTHON", sys.executable)
     recipe, root = tmp_path / "a recipe.toml", tmp_path / "a dataset"
     recipe.write_text(tiny[0])
     done = run("slurm.sh", recipe, root, 2)
     assert done.returncode == 0, done.stderr
-    assert content(root) == content(tiny[1])
+    assert content(root) == content(reported)
     for name in ("manifest.json", "report.html"):
-        assert timeless(root / name) == timeless(tiny[1] / name)
+        assert timeless(root / name) == timeless(reported / name)
 
 
 def test_ray_starts_everywhere_runs_and_stops(stand_ins, tmp_path, monkeypatch):
