@@ -31,7 +31,6 @@ Asked is: nothing wrong, corners found no less often and with an RMS no larger t
 and of circles {NORMALISED[0]} to {NORMALISED[1]} (40 circles tell it to 8 %), no picture above {SLOWEST_S:g} s."""
 REASONS = {
     "phone": "a filter that keeps edges leaves a shadow's rim another form than any lens",
-    "ink-thin": "a print whose black is thinner has a circle of another size than the map says",
 }  # by kind, why it does not hold everything
 COLUMNS = ["kind", "views", "found", "classic", "sector", "wrong", "RMS", "bias", "norm", "on shared: ours, classic",
            "ours, sector", "mean, slowest s", "classic s", "sector s"]  # fmt: skip
