@@ -217,7 +217,8 @@ class _Place:
         """Px by which edges seem to be moved; none where it is a motion between rows that makes corners look odd."""
         if np.any(fit.fields_px):
             return 0.0
-        return moved_edges(self.corners.noise, fit.residual, self.corners.contrast, self.corners.blur_px)
+        corners = self.corners
+        return moved_edges(corners.noise, fit.residual, corners.scatter, corners.contrast, corners.blur_px)
 
     def _light(self, patch: Patch) -> float:
         """Grey value of the white."""

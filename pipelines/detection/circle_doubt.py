@@ -21,6 +21,8 @@ BEYOND_SHARE, APART_SHARE = 0.085, 0.3  # of what they differ by more, and along
 ODD_SHARE = 0.25  # of how far the corners' edges seem to be moved, by which a circle may be, as its contrast differs
 ODD = 2.0, 4.0  # times the variance that the circle's fit leaves: up to the first the two may differ by chance, and
 # what corners show beyond the second lies at their tips alone
+SCATTERED = 0.6  # of the scatter that the corners' residuals promise, see `corner_scatter`: with less, these are
+# the same at all corners, as print and clipped white, and move none of them
 PER_SLOPE = math.sqrt(2.0 * math.pi)  # blurs over which an edge's steepest part would rise from black to white
 USUAL_SIZE = 0.0005  # by which a fit that explains the picture finds another size than the map's
 SURE_SIZE = 0.5  # deviations of the map's size that also say nothing
@@ -28,14 +30,14 @@ SHARPENED_SHARE = 0.15  # of what edges are narrower or wider, by which sharpeni
 RESIZED = 1.8  # times as far as the fit would move at the map's size, what made the size wrong may move the place
 
 
-def moved_edges(noise: float, left: float, contrast: float, blur_px: float) -> float:
+def moved_edges(noise: float, left: float, scatter: float, contrast: float, blur_px: float) -> float:
     """Px by which edges seem to be moved whose form is none of a blur: filters that keep edges and others make such.
 
     noise, left: variances that the fits of corners leave, NaN if not known, and of the circle, grey values^2.
-    contrast: of white and black, grey values.
+    scatter: of the corners, see `corner_scatter`. contrast: of white and black, grey values.
     """
     usual, most = ODD
-    if not noise > usual * left:
+    if scatter < SCATTERED or not noise > usual * left:
         return 0.0
     return PER_SLOPE * blur_px * math.sqrt(min(noise, most * left) - usual * left) / contrast
 

@@ -33,7 +33,7 @@ OVERSHOOT, SURE = 0.015, 3.0  # of black to white: what a sharpened edge goes be
 # JPEG shows 0.011, and noise less than these errors
 BINS_PX = np.arange(0.5, 8.5, 0.5)  # from an edge, in which this is looked for
 LEAST_SAMPLES = 20  # in one
-KERNEL_PX, KERNEL_COPIES = 4, 4.0  # to each side: px, and copies' blurs; a hundredth of the inverse filter lies beyond
+KERNEL_PX, KERNEL_COPIES = 4, 4.0  # to each side: px, and copies' blurs; up to a fifteenth of a filter lies beyond
 TRANSFORM = 128  # samples of a filter's transform along each axis
 BEYOND = 0.35  # of the extent of the board's corners: what lies around them is put back, too
 
@@ -100,13 +100,15 @@ def without_sharpening(image: Light, sharpening: Sharpening, around: Array) -> L
     around: (n, 2) px, places of the board.
     """
     height, width = image.shape
+    around = around[np.all((around >= 0.0) & (around < (width, height)), axis=1)]
+    if not len(around):
+        return image.copy()
     filter_ = _inverse_filter(sharpening)
     margin = len(filter_) + BEYOND * np.ptp(around, axis=0).max()
     x0, y0 = np.clip(np.floor(around.min(axis=0) - margin), 0, (width, height)).astype(int)
     x1, y1 = np.clip(np.ceil(around.max(axis=0) + margin), 0, (width, height)).astype(int)
-    part = image[y0:y1, x0:x1]
+    part, out = image[y0:y1, x0:x1], image.copy()
     before = cv2.filter2D(part, cv2.CV_32F, filter_, borderType=cv2.BORDER_REFLECT_101)
-    out = image.copy()
     out[y0:y1, x0:x1] = np.clip(before, 0.0, 255.0)
     return out
 

@@ -107,3 +107,9 @@ def test_clipped_pixels_stay_clipped_for_the_circle(board):
     assert np.all(marked[clipped] == 255.0)
     np.testing.assert_array_equal(marked[~clipped], light[~clipped])
     assert PLAIN.with_clipped(light, grey) is light
+
+
+def test_a_board_that_no_camera_can_see_changes_nothing(board):
+    image = board[0].astype(np.float32)
+    for around in (np.full((4, 2), np.nan), np.full((4, 2), 1e6)):
+        np.testing.assert_array_equal(without_sharpening(image, Sharpening(1.0, 1.0), around), image)
