@@ -11,9 +11,7 @@ import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from eposit.arrays import Array
@@ -21,6 +19,7 @@ from pipelines.detection.circle_blur import Blur, edge_blur, still
 from pipelines.detection.circle_doubt import at_least, beyond_the_fit, moved_edges, unexplained_size
 from pipelines.detection.circle_light import MANY_CELLS, MUCH_CLIPPED, fit_in_any_light
 from pipelines.detection.circle_map import MapErrors, map_errors, prediction_covariance
+from pipelines.detection.circle_means import corners_in_means, picture_of_means, pixels_to_one
 from pipelines.detection.circle_model import ROUNDING, cost_of, fit_disc
 from pipelines.detection.circle_numbers import DISC_GREY, FURTHER, SHAPE, SIZE, WHITE_GREY, DiscFit, Patch, Prior
 from pipelines.detection.circle_patch import Picture, circle_patch, of_one_field
@@ -42,11 +41,7 @@ GOOD_SHARE = 1.2  # of the residuals of the best fit in the ellipse, up to which
 FAR_SPREADS = 3.0  # of the prediction that a circle may lie off, for each that a linear map allows
 USUALLY_LEFT, MOST_LEFT = 1.2, 30.0  # times the corners' noise that a fit leaves: no model of a disc explains more
 SIZE_LIMIT = 0.03  # of the size
-LARGE_RADIUS_PX = 30.0  # a larger circle is read in means of pixels that leave its edges this blur:
-LEAST_BLUR_PX = 0.7  # below it the fine grid would sample them badly
-MOST_RADIUS_PX = 150.0  # a larger one is read in means whatever it costs: 0.03 px instead of 0.01, in bounded time
 MOTION_SHARE = 0.8  # of the residuals of a picture that stood still, below which those of a motion must be
-MOVED_RADIUS_PX, LONG_STREAK_PX = 60.0, 12.0  # likewise where the picture moved: a fit costs four times as much
 LEAST_AXIS = 1.5  # blurs: a disc whose smaller half axis is below this has no edges of its own
 
 
@@ -72,11 +67,11 @@ def find_circle(
     axes = np.linalg.svd(board.jacobian(foot, height), compute_uv=False) * radius
     if axes[-1] < LEAST_AXIS * corners.blur_px:
         return None
-    by = _pixels_to_one(float(axes[0]), corners.blur_px, motion)
+    by = pixels_to_one(float(axes[0]), corners.blur_px, motion)
     unsure, known = prediction_covariance(board, target, image.shape), map_errors(corners, at, target, image.shape)
     if by > 1:
-        image, motion = _means(image, by), motion and motion.scaled(1.0 / by)
-        corners = replace(corners, board=board.reduced(by), blur_px=corners.blur_px / by, noise=corners.noise / by**2)
+        image, motion = picture_of_means(image, by), motion and motion.in_means(by)
+        corners = corners_in_means(corners, by)
     place = _Place(image, corners, target, misfit, unsure, known, None)
     if motion is not None:
         place = _likelier(place, replace(place, motion=motion))
@@ -90,21 +85,6 @@ def _likelier(still: _Place, moved: _Place) -> _Place:
     Lamps that flicker, reflections and noise can make the corners look as if they had moved.
     """
     return moved if moved.left(moved.blur) < MOTION_SHARE * still.left(still.blur) else still
-
-
-def _pixels_to_one(radius_px: float, blur_px: float, motion: Blur | None) -> int:
-    """Along each side: how many pixels' mean is read in the place of one, for a circle that is large."""
-    harmless = min(math.ceil(radius_px / LARGE_RADIUS_PX), max(1, int((motion or still(blur_px)).px / LEAST_BLUR_PX)))
-    if motion is None:
-        return max(harmless, math.ceil(radius_px / MOST_RADIUS_PX))
-    return max(harmless, math.ceil(max(radius_px / MOVED_RADIUS_PX, np.linalg.norm(motion.streak) / LONG_STREAK_PX)))
-
-
-def _means(image: Picture, by: int) -> NDArray[np.float32]:
-    """A picture of the means of `by` x `by` pixels; what is left at the right and below is cut off."""
-    height, width = (side // by for side in image.shape)
-    whole = image[: height * by, : width * by].astype(np.float32)
-    return np.asarray(cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA), np.float32)
 
 
 @dataclass(frozen=True)

@@ -47,6 +47,10 @@ class Blur(NamedTuple):
         """A picture's that is smaller or sharper by a share."""
         return Blur(share * self.px, share * self.streak)
 
+    def in_means(self, by: int) -> Blur:
+        """In a picture of the means of `by` x `by` pixels, whose centres spread over an area of that size."""
+        return Blur(math.sqrt(self.px**2 + (by**2 - 1) / 12.0), self.streak).scaled(1.0 / by)
+
 
 def still(blur_px: float) -> Blur:
     """Without motion."""

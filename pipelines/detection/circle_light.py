@@ -20,11 +20,13 @@ from pipelines.detection.circle_numbers import (
     RIM,
     SHADOW,
     SHAPE,
+    SIZE,
     WHITE_GREY,
     DiscFit,
     Patch,
     Prior,
 )
+from pipelines.detection.circle_patch import around_another_disc
 from pipelines.detection.circle_scatter import confirmed
 
 Rings = tuple[tuple[float, int], ...]
@@ -43,6 +45,7 @@ MISSING = 1.2  # likewise: one lamp does not explain them
 AS_GOOD = 0.01, 0.1  # of the residuals of the best, and where much is clipped: what a fit may leave more
 UNDECIDED = 9.0  # variances by which the sums of squares of two fits may differ: three deviations
 NO_SLOPE, STRAY_SLOPE = 1e-6, 0.02  # of the disc's grey over a radius, times the white's; and where light strays on it
+OTHER_FORM = 0.002  # of its size or form: a disc that differs from the map's by more casts its own shadow
 PRINT_SPREAD = 0.01  # of the form, where the print is longer one way
 SURE_GAIN = 15.0  # variances by which either must make the sum of squares less: noise does so once in 2000
 POSSIBLE = 0.1  # of the white's grey: light that a fit may lack or have too much, by noise and rims of other forms
@@ -57,6 +60,7 @@ def fit_in_any_light(patch: Patch, known: Prior, height: float, light: float) ->
     height: of the circle above the board, radii. light: grey value of the white.
     """
     plain, known = _in_any_form(fit_disc(patch, known), patch, known)
+    plain, patch = _with_own_shadow(plain, patch, known, height)
     stray = _with_spread(known, DISC_SLOPE, STRAY_SLOPE * light)
     gain = plain.residual * len(patch.grey) - cost_of(patch, stray, plain.values[:SHAPE])
     if gain > SURE_GAIN * plain.residual * confirmed(known.scatter, plain.unexplained):
@@ -86,6 +90,20 @@ def _in_any_form(fit: DiscFit, patch: Patch, known: Prior) -> tuple[DiscFit, Pri
         return fit, known
     known = _with_spread(known, OBLONG, PRINT_SPREAD)
     return fit_disc(patch, replace(known, start=fit.values[:SHAPE])), known
+
+
+def _with_own_shadow(fit: DiscFit, patch: Patch, known: Prior, height: float) -> tuple[DiscFit, Patch]:
+    """The fit, again with the shade of the disc that it found where that explains the picture better, and its patch.
+
+    A board that is bent or printed too wide has another map than its disc. The shadow's own rim does not tell the
+    disc's size: a lamp near by makes it larger, and one of another form than the model's moves it.
+    """
+    off = np.append(fit.values[OBLONG], fit.values[SIZE] - 1.0)
+    if not fit.converged or np.max(np.abs(off)) < OTHER_FORM:
+        return fit, patch
+    own = around_another_disc(patch, fit.values, height)
+    again = fit_disc(own, replace(known, start=fit.values[:SHAPE]))
+    return (again, own) if again.converged and again.residual < fit.residual else (fit, patch)
 
 
 def _with_spread(known: Prior, which: slice, value: float) -> Prior:
@@ -125,7 +143,7 @@ def _best_of(fits: list[DiscFit], patch: Patch, known: Prior) -> DiscFit:
     How far others lie that are as good is in its covariance.
     """
     best = min(fits, key=lambda fit: (not fit.converged, fit.residual))
-    undecided = UNDECIDED * confirmed(known.scatter, best.unexplained) / len(patch.grey)
+    undecided = UNDECIDED * known.scatter / len(patch.grey)
     limit = best.residual * (1.0 + max(AS_GOOD[int(patch.clipped > MUCH_CLIPPED)] * known.scatter, undecided))
     others = [fit for fit in fits if fit.converged and fit.residual < limit]
     best = min(others or [best], key=lambda fit: (max(_impossible(fit), POSSIBLE), fit.residual))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from eposit.arrays import Array, Mask
 from pipelines.detection.board_map import BoardMap
 from pipelines.detection.circle_blur import Blur
-from pipelines.detection.circle_numbers import Patch, Places
+from pipelines.detection.circle_numbers import OBLONG, SIZE, Patch, Places
 from pipelines.detection.finders import Grey
 from pipelines.detection.kernels import compiled
 from render.targets.chessboard import Chessboard
@@ -115,6 +115,18 @@ def of_one_field(patch: Patch, first: int, moved_px: Array) -> Patch:
     kept, blur = patch.rows % 2 == first, math.sqrt(max(patch.blur_px**2 - moved_px @ moved_px / 8.0, 0.0))
     own = replace(patch, grey=patch.grey[kept], rows=patch.rows[kept], columns=patch.columns[kept])
     return replace(own, blur_px=blur, kernel=_kernel(blur, patch.finer))
+
+
+def around_another_disc(patch: Patch, shape: Array, height: float) -> Patch:
+    """A patch with what a disc of another size and form shades: its shadow is as large as it, and as oblong.
+
+    shape: (8,) of a fit's disc. height: above the board, radii.
+    """
+    along, aside = shape[OBLONG] / shape[SIZE]
+    share = 1.0 / shape[SIZE]
+    form = np.array([[share - along, -aside], [-aside, share + along]])
+    on_board = np.einsum("ij,jhw->ihw", form, patch.on_board)
+    return replace(patch, on_board=on_board, blocked=blocked_share(np.hypot(*on_board), 1.0, height))
 
 
 @compiled
