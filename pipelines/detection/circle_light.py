@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from eposit.arrays import Array
+from pipelines.detection.circle_even_light import in_even_light
 from pipelines.detection.circle_model import STEPS, cost_of, fit_disc, shadow_of
 from pipelines.detection.circle_numbers import (
     BLOCKED,
@@ -61,6 +62,7 @@ def fit_in_any_light(patch: Patch, known: Prior, height: float, light: float) ->
     """
     plain, known = _in_any_form(fit_disc(patch, known), patch, known)
     plain, patch = _with_own_shadow(plain, patch, known, height)
+    plain, patch = in_even_light(plain, patch, known)
     stray = _with_spread(known, DISC_SLOPE, STRAY_SLOPE * light)
     gain = plain.residual * len(patch.grey) - cost_of(patch, stray, plain.values[:SHAPE])
     if gain > SURE_GAIN * plain.residual * confirmed(known.scatter, plain.unexplained):

@@ -13,6 +13,7 @@ from eposit.arrays import Array, Mask
 from pipelines.detection.board_map import BoardMap
 from pipelines.detection.corner_sites import CornerSites
 from pipelines.detection.finders import Grey
+from pipelines.spread import median_with_error
 
 MOST_CORNERS = 9  # that are looked at
 PLACES = (0.4, 0.55, 0.7)  # on an edge, in reaches from the corner: their profiles are averaged
@@ -22,6 +23,7 @@ LEAST_CONTRAST = 0.5  # of the median one: what a profile must have
 ENDS = 0.2  # share of a profile at each end, which is taken for white or black
 LIMITS_PX = (0.4, 6.0)
 SAMPLING = 1.0 / 6.0  # variance that linear interpolation adds, px^2
+SURE_WIDER = 2.0  # standard errors that count as chance
 FALLBACK_PX = 0.8  # an ordinary lens in focus
 
 Picture = Grey | NDArray[np.float32]  # (height, width) grey values
@@ -56,17 +58,19 @@ def measured_blur(image: Picture, board: BoardMap, sites: CornerSites) -> float:
 
 
 def widths_beyond(image: Picture, board: BoardMap, sites: CornerSites, blur_px: float) -> Array:
-    """(2,) by how many px edges along the board's x and y are wider than a gaussian blur makes them; NaN if not seen.
+    """(2,) by how many px edges along the board's x and y surely are wider than a gaussian blur makes them; NaN if not
+    seen.
 
     Motion makes those along one axis wider than along the other. In a sharpened picture, the integral of q (1 - q) is
-    less than the edge's slope says, as q goes beyond 0 and 1.
+    less than the edge's slope says, as q goes beyond 0 and 1. Light that changes along q, as in waves from row to row,
+    makes some edges look wider and others narrower.
     """
     profiles = edge_profiles(image, board, sites)
     if profiles is None or profiles.along_y.all() or not profiles.along_y.any():
         return np.full(2, np.nan)
-    widths = profile_widths(profiles)
-    both = [np.median(widths[profiles.along_y == along]) for along in (False, True)]
-    return np.array(both) - math.sqrt(blur_px**2 + SAMPLING)
+    wider = profile_widths(profiles) - math.sqrt(blur_px**2 + SAMPLING)
+    middles, errors = np.array([median_with_error(wider[profiles.along_y == along]) for along in (False, True)]).T
+    return np.sign(middles) * np.maximum(np.abs(middles) - SURE_WIDER * errors, 0.0)
 
 
 def profile_widths(profiles: EdgeProfiles) -> Array:
