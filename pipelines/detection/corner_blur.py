@@ -23,7 +23,7 @@ LEAST_CONTRAST = 0.5  # of the median one: what a profile must have
 ENDS = 0.2  # share of a profile at each end, which is taken for white or black
 LIMITS_PX = (0.4, 6.0)
 SAMPLING = 1.0 / 6.0  # variance that linear interpolation adds, px^2
-SURE_WIDER = 2.0  # standard errors that count as chance
+SURE_WIDER = 1.0  # standard errors that count as chance
 FALLBACK_PX = 0.8  # an ordinary lens in focus
 
 Picture = Grey | NDArray[np.float32]  # (height, width) grey values
