@@ -17,7 +17,7 @@ from scipy.optimize import minimize_scalar
 from eposit.arrays import Array
 from pipelines.detection.circle_blur import Blur, edge_blur, still
 from pipelines.detection.circle_doubt import at_least, beyond_the_fit, moved_edges, unexplained_size
-from pipelines.detection.circle_light import MANY_CELLS, MUCH_CLIPPED, fit_in_any_light
+from pipelines.detection.circle_light import HOPELESS, MANY_CELLS, MUCH_CLIPPED, fit_in_any_light
 from pipelines.detection.circle_map import MapErrors, map_errors, prediction_covariance
 from pipelines.detection.circle_means import corners_in_means, picture_of_means, pixels_to_one
 from pipelines.detection.circle_model import ROUNDING, cost_of, fit_disc
@@ -30,6 +30,7 @@ from render.targets.chessboard import Chessboard
 WHITE_PERCENT = 95.0  # of the patch's pixels that are no brighter than its white, but for noise
 SHARPENED = 1.0, 2.3, 0.3  # times as blurred as they look: from, to, by; then so many steps to what fits best
 SHARPENED_STEPS = 6
+LEFT_STEPS = 30  # of a fit that tells only what is left: it converges in as many or hardly
 LEAST_CONTRAST = 0.35  # of the board's: what a circle's edge must have
 SEARCH_SHARE = 0.1  # of a square: how far the centre may lie from where the board predicts it, if its map is sure
 FARTHEST_SHARE = 0.25  # of a square, however unsure it is
@@ -141,10 +142,10 @@ class _Place:
         """Of the circle's edges."""
         return self.motion or still(edge_blur(self.corners))
 
-    def left(self, blur: Blur) -> float:
-        """Variance of the residuals, grey values^2, of one fit with a blur."""
+    def left(self, blur: Blur, hopeless: float = math.inf) -> float:
+        """Variance of the residuals, grey values^2, of one fit with a blur. hopeless: of `fit_disc`."""
         patch = self._patch(blur)
-        return np.inf if patch is None else fit_disc(patch, self._known(patch)).residual
+        return np.inf if patch is None else fit_disc(patch, self._known(patch), LEFT_STEPS, hopeless).residual
 
     def _best_fit(self) -> DiscFit | None:
         """Of the circle where the board puts it and, if the place is unsure, of one that is looked for around it."""
@@ -207,8 +208,11 @@ class _Place:
     def _sharpened(self, blur: Blur) -> float:
         """Share of the blur that a picture has whose edges look sharper because it is clipped: what fits best."""
 
+        found: list[float] = []
+
         def left(share: float) -> float:
-            return self.left(blur.scaled(share))
+            found.append(self.left(blur.scaled(share), HOPELESS * min(found, default=np.inf)))
+            return found[-1]
 
         looks = np.arange(*SHARPENED)
         best = int(np.argmin([left(share) for share in looks]))

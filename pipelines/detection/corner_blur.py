@@ -23,7 +23,7 @@ LEAST_CONTRAST = 0.5  # of the median one: what a profile must have
 ENDS = 0.2  # share of a profile at each end, which is taken for white or black
 LIMITS_PX = (0.4, 6.0)
 SAMPLING = 1.0 / 6.0  # variance that linear interpolation adds, px^2
-SURE_WIDER = 1.0  # standard errors that count as chance
+SURE_WIDER = 2.0  # standard errors up to which it is chance
 FALLBACK_PX = 0.8  # an ordinary lens in focus
 
 Picture = Grey | NDArray[np.float32]  # (height, width) grey values
@@ -70,7 +70,7 @@ def widths_beyond(image: Picture, board: BoardMap, sites: CornerSites, blur_px: 
         return np.full(2, np.nan)
     wider = profile_widths(profiles) - math.sqrt(blur_px**2 + SAMPLING)
     middles, errors = np.array([median_with_error(wider[profiles.along_y == along]) for along in (False, True)]).T
-    return np.sign(middles) * np.maximum(np.abs(middles) - SURE_WIDER * errors, 0.0)
+    return np.where(np.abs(middles) > SURE_WIDER * errors, middles, 0.0)
 
 
 def profile_widths(profiles: EdgeProfiles) -> Array:

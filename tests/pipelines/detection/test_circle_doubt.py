@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from scipy.special import ndtr
 
-from pipelines.detection import circle
+from pipelines.detection import circle, corner_blur
 from pipelines.detection.board_map import BoardMap, grid
 from pipelines.detection.circle import find_circle
 from pipelines.detection.circle_doubt import RESIZED, at_least, beyond_the_fit, moved_edges, unexplained_size
@@ -55,6 +56,24 @@ def test_noise_in_the_edges_widths_is_not_taken_for_sharpening():
 
     assert np.allclose(added(faint, seen), added(faint, none))
     assert added(SURE, seen)[0, 0] > 4.0 * added(SURE, none)[0, 0]
+
+
+def widths(monkeypatch, scatter):
+    """What edges seem to be wider by that are 0.3 px wider than a blur of 1 px, and scatter by so many px."""
+    away = np.linspace(-14.0, 14.0, 113)
+    px = np.sqrt(1.0 + corner_blur.SAMPLING) + 0.3 + scatter * np.tile([-1.0, -0.5, 0.0, 0.5, 1.0, 0.0], 6)
+    shares, step = ndtr(away / px[:, None]), np.full(len(px), away[1] - away[0])
+    profiles = corner_blur.EdgeProfiles(
+        shares, step, np.ones(len(px), bool), np.arange(len(px)) % 12 < 6, shares[:, :2]
+    )
+    monkeypatch.setattr(corner_blur, "edge_profiles", lambda *picture: profiles)
+    return corner_blur.widths_beyond(np.zeros((2, 2), np.float32), None, None, 1.0)
+
+
+def test_widths_that_differ_from_edge_to_edge_are_not_told(monkeypatch):
+    """As waves of light make them. 18 edges that scatter by 0.7 px tell their median to 0.22 px."""
+    assert np.allclose(widths(monkeypatch, 0.0), 0.3, atol=0.01)
+    assert np.all(widths(monkeypatch, 0.7) == 0.0)
 
 
 def test_what_corners_show_beyond_the_circle_moves_it():

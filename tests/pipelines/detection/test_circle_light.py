@@ -53,3 +53,11 @@ def test_of_fits_that_explain_the_same_the_possible_one_is_taken_and_the_other_i
     assert best.values[0] == 0.0
     assert best.covariance[0, 0] > 0.06**2
     assert circle_light._best_of(fits, many, known).values[0] == 0.06
+
+
+def test_noise_that_neighbours_share_leaves_more_fits_undecided():
+    """7 % more than the best of 350 pixels: where corners scatter by a factor of 3 that is chance, however this fit's
+    own residuals look."""
+    patch, fits = SimpleNamespace(grey=np.zeros(350), clipped=0.0), [fitted(0.0, 60.0, 9.0), fitted(0.06, 240.0, 8.41)]
+    assert circle_light._best_of(fits, patch, SimpleNamespace(scatter=1.0)).values[0] == 0.06
+    assert circle_light._best_of(fits, patch, SimpleNamespace(scatter=3.0)).values[0] == 0.0
