@@ -44,6 +44,7 @@ DOUBTFUL = 1.05  # times the variance that is left with further shadows: the one
 HOPELESS = 3.0  # times its residuals: a start that is so bad after some steps does not become better, of 96 none
 MISSING = 1.2  # likewise: one lamp does not explain them
 AS_GOOD = 0.01, 0.1  # of the residuals of the best, and where much is clipped: what a fit may leave more
+UNLIKELY = 0.05  # likewise, for each part of light that cannot be: as much as the white has must explain far more
 UNDECIDED = 9.0  # variances by which the sums of squares of two fits may differ: three deviations
 NO_SLOPE, STRAY_SLOPE = 1e-6, 0.02  # of the disc's grey over a radius, times the white's; and where light strays on it
 OTHER_FORM = 0.002  # of its size or form: a disc that differs from the map's by more casts its own shadow
@@ -146,7 +147,10 @@ def _best_of(fits: list[DiscFit], patch: Patch, known: Prior) -> DiscFit:
     """
     best = min(fits, key=lambda fit: (not fit.converged, fit.residual))
     undecided = UNDECIDED * known.scatter / len(patch.grey)
-    limit = best.residual * (1.0 + max(AS_GOOD[int(patch.clipped > MUCH_CLIPPED)] * known.scatter, undecided))
+    unlikely = UNLIKELY * max(_impossible(best) - POSSIBLE, 0.0)
+    limit = best.residual * (
+        1.0 + max(AS_GOOD[int(patch.clipped > MUCH_CLIPPED)] * known.scatter, undecided) + unlikely
+    )
     others = [fit for fit in fits if fit.converged and fit.residual < limit]
     best = min(others or [best], key=lambda fit: (max(_impossible(fit), POSSIBLE), fit.residual))
     apart = [fit.values - best.values for fit in others] or [0.0 * best.values]

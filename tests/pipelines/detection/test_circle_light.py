@@ -48,7 +48,7 @@ def test_of_fits_that_explain_the_same_the_possible_one_is_taken_and_the_other_i
     """Of 350 pixels a fit may leave 2.6 % more by chance: nine variances."""
     few, many = (SimpleNamespace(grey=np.zeros(n), clipped=0.0) for n in (350, 35_000))
     known = SimpleNamespace(scatter=1.0)
-    fits = [fitted(0.0, 60.0, 8.6), fitted(0.06, 240.0, 8.41)]  # a lamp that gives more than there is on the white
+    fits = [fitted(0.0, 60.0, 8.6), fitted(0.06, 120.0, 8.41)]  # a lamp that gives more than there is on the white
     best = circle_light._best_of(fits, few, known)
     assert best.values[0] == 0.0
     assert best.covariance[0, 0] > 0.06**2
@@ -58,6 +58,14 @@ def test_of_fits_that_explain_the_same_the_possible_one_is_taken_and_the_other_i
 def test_noise_that_neighbours_share_leaves_more_fits_undecided():
     """7 % more than the best of 350 pixels: where corners scatter by a factor of 3 that is chance, however this fit's
     own residuals look."""
-    patch, fits = SimpleNamespace(grey=np.zeros(350), clipped=0.0), [fitted(0.0, 60.0, 9.0), fitted(0.06, 240.0, 8.41)]
+    patch, fits = SimpleNamespace(grey=np.zeros(350), clipped=0.0), [fitted(0.0, 60.0, 9.0), fitted(0.06, 120.0, 8.41)]
     assert circle_light._best_of(fits, patch, SimpleNamespace(scatter=1.0)).values[0] == 0.06
     assert circle_light._best_of(fits, patch, SimpleNamespace(scatter=3.0)).values[0] == 0.0
+
+
+def test_light_that_cannot_be_must_explain_far_more():
+    """A lamp with 3.4 times the white's light, of which 2.3 times are none that can be, explains 9 % more."""
+    patch, known = SimpleNamespace(grey=np.zeros(35_000), clipped=0.0), SimpleNamespace(scatter=1.0)
+    possible, better = fitted(0.0, 60.0, 9.2), fitted(0.06, 340.0, 8.41)
+    assert circle_light._best_of([possible, better], patch, known).values[0] == 0.0
+    assert circle_light._best_of([possible, fitted(0.06, 150.0, 8.41)], patch, known).values[0] == 0.06
