@@ -19,17 +19,30 @@ PLACE = Path("pipelines", "detection")  # in a checkout
 
 
 def carry_kernels(checkout: Path) -> None:
-    """Give a copy of a checkout what this checkout keeps of compiled functions, unless it has some of its own."""
-    package, name = checkout / PLACE, kernel_cache.PREFIX + kernel_cache.hash_of_sources(checkout / PLACE)
-    own, target = kernel_cache.choose_folder(), package / "__pycache__" / name
-    if own is None or own.name != name or target.exists():
+    """Give a copy of a checkout what this checkout keeps of compiled functions, unless it has some of its own.
+
+    It goes where the copy will look for it: beside the copy's sources, or where NUMBA_CACHE_DIR says.
+    """
+    package, own = checkout / PLACE, kernel_cache.choose_folder()
+    if own is None or own.name != kernel_cache.PREFIX + kernel_cache.hash_of_sources(package):
         return
-    temporary = target.with_name(own_name(".tmp-"))
+    place = place_of(checkout)
+    if place is None:
+        return
+    temporary = place.with_name(own_name(".tmp-"))
     try:
-        shutil.copytree(_of_sources(own, kernel_cache.PACKAGE), _of_sources(temporary, package))
-        temporary.rename(target)
+        if not place.exists():
+            shutil.copytree(_of_sources(own, kernel_cache.PACKAGE), temporary)
+            temporary.rename(place)
     except OSError:  # there is nothing yet, the disk refuses, or another process was faster
         shutil.rmtree(temporary, ignore_errors=True)
+
+
+def place_of(checkout: Path) -> Path | None:
+    """Where a checkout's processes look for what was compiled of its detection; None where no place can be written."""
+    package = checkout / PLACE
+    folder = kernel_cache.choose_folder(package)
+    return None if folder is None else _of_sources(folder, package)
 
 
 def _of_sources(folder: Path, package: Path) -> Path:

@@ -1,16 +1,14 @@
 """The baseline's code: a frozen copy runs, and nothing else answers in its place."""
 
 import shutil
-from pathlib import Path
 
 import pytest
 
 from datasets.store.dataset import open_dataset
 from datasets.verify import verify
 from pipelines.detection.prepare import compile_kernels
+from pipelines.nightly.carried_kernels import place_of
 from pipelines.nightly.other_code import CHOOSE_CODE, ROOT, Code, OtherCodeError, digest_of, freeze
-
-KERNELS = Path("pipelines", "detection", "__pycache__")
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +94,7 @@ def test_machine_code_of_other_sources_is_not_carried(frozen, tmp_path):
     changed = tmp_path / "changed"
     shutil.copytree(frozen, changed, ignore=shutil.ignore_patterns("__pycache__"))
     compile_kernels()
-    assert (freeze(tmp_path / "same", changed) / KERNELS).is_dir()
+    assert place_of(freeze(tmp_path / "same", changed)).is_dir()
     with open(changed / "pipelines" / "detection" / "levels.py", "a") as file:
         file.write("# another\n")
-    assert not (freeze(tmp_path / "other", changed) / KERNELS).exists()
+    assert not place_of(freeze(tmp_path / "other", changed)).exists()
