@@ -113,13 +113,27 @@ class Code:
         except subprocess.TimeoutExpired:
             raise OtherCodeError(f"{self._named}, {what}: did not end within {self.limit_s:g} s") from None
         if done.returncode:
-            said = " ".join((done.stderr or done.stdout).strip().splitlines()[-LAST_LINES:])
+            said = " ".join(_without_ignored((done.stderr or done.stdout).strip().splitlines())[-LAST_LINES:])
             raise OtherCodeError(f"{self._named}, {what}: {said or f'exit {done.returncode}'}")
         return done
 
     @property
     def _named(self) -> str:
         return f"code in {self.folder}" if self.user is None else f"{self.user[0]} in {self.user[1]}"
+
+
+def _without_ignored(lines: list[str]) -> list[str]:
+    """Without what Python tells of exceptions that it ignores, as while objects go at a process's end."""
+    kept: list[str] = []
+    is_ignored = False
+    for line in lines:
+        if line.startswith("Exception ignored"):
+            is_ignored = True
+        elif not is_ignored:
+            kept.append(line)
+        elif not line.startswith(("Traceback", " ")):
+            is_ignored = False  # the exception's own line ends it
+    return kept
 
 
 def digest_of(folder: Path = ROOT, files: Sequence[Path] | None = None) -> str:

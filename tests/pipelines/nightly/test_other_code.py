@@ -61,6 +61,21 @@ def test_what_fails_is_told(frozen):
         Code(frozen).run("describe", "nosuch")
 
 
+FAILS_WITH_MORE_AT_ITS_END = """
+class Held:
+    def __del__(self):
+        raise OSError("closed already")
+held = Held()
+sys.exit("the reason")
+"""
+
+
+def test_the_reason_is_told_whatever_python_says_behind_it(frozen):
+    with pytest.raises(OtherCodeError) as told:
+        Code(frozen).run_program(CHOOSE_CODE + FAILS_WITH_MORE_AT_ITS_END, what="end")
+    assert str(told.value).endswith("end: the reason")
+
+
 def test_code_that_hangs_is_ended(frozen, tmp_path):
     hanging = tmp_path / "hanging"
     shutil.copytree(frozen, hanging)
