@@ -104,7 +104,7 @@ def _with_own_shadow(fit: DiscFit, patch: Patch, known: Prior, height: float) ->
     off = np.append(fit.values[OBLONG], fit.values[SIZE] - 1.0)
     if not fit.converged or np.max(np.abs(off)) < OTHER_FORM:
         return fit, patch
-    own = around_another_disc(patch, fit.values, height)
+    own = around_another_disc(patch, fit.values[:SHAPE], height)
     again = fit_disc(own, replace(known, start=fit.values[:SHAPE]))
     return (again, own) if again.converged and again.residual < fit.residual else (fit, patch)
 
