@@ -30,7 +30,7 @@ def in_even_light(fit: DiscFit, patch: Patch, known: Prior) -> tuple[DiscFit, Pa
     linear = np.stack([at_pixels(patch, np.ascontiguousarray(part)) for part in (x, y)])
     second = np.stack([at_pixels(patch, part) for part in squares])
     # Three more fields are taken from the white, as further shadows are.
-    uneven, curved = replace(patch, shadows=squares), _curves_known(known, CURVED * fit.values[WHITE_GREY])
+    uneven, curved = replace(patch, shadows=squares), known.with_fields(3, CURVED * fit.values[WHITE_GREY])
     start = fit.values[:SHAPE]
     for done in range(ROUNDS + 1):
         found = fit_disc(uneven, replace(curved, start=start))
@@ -43,8 +43,3 @@ def in_even_light(fit: DiscFit, patch: Patch, known: Prior) -> tuple[DiscFit, Pa
     even = replace(patch, grey=uneven.grey)
     again = fit_disc(even, replace(known, start=start))
     return (again, even) if again.converged and again.residual < fit.residual else (fit, patch)
-
-
-def _curves_known(known: Prior, spread: float) -> Prior:
-    """What is known of a fit with the three curves as well, which have a spread, grey values."""
-    return replace(known, mean=np.append(known.mean, np.zeros(3)), spread=np.append(known.spread, np.full(3, spread)))

@@ -178,8 +178,4 @@ def _lit(patch: Patch, known: Prior, rings: Rings, softness: float, height: floa
     """The patch and what is known of it with the shadows of lamps all around."""
     places = _places(rings, height)
     shadows = np.array([shadow_of(patch.on_board, place, softness * height) for place in places])
-    mean, spread = np.zeros(len(places)), np.full(len(places), SPREAD * light)
-    return (
-        replace(patch, shadows=shadows),
-        replace(known, mean=np.append(known.mean, mean), spread=np.append(known.spread, spread)),
-    )
+    return replace(patch, shadows=shadows), known.with_fields(len(places), SPREAD * light)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +49,12 @@ class Prior:
     spread: Array  # (17 + m,) standard deviations
     furthest_shadow: float  # radii
     scatter: float  # factor, 1 or more, by which the board's corners scatter more than independent noise makes them
+
+    def with_fields(self, count: int, spread: float) -> Prior:
+        """What is known with more fields of light beside the patch's shadows, each 0 with a spread, grey values."""
+        return replace(
+            self, mean=np.append(self.mean, np.zeros(count)), spread=np.append(self.spread, np.full(count, spread))
+        )
 
 
 @dataclass(frozen=True, slots=True)
