@@ -16,6 +16,9 @@ from pipelines.detection.circle_numbers import FURTHER, SHAPE, WHITE_GREY, WHITE
 from pipelines.detection.circle_pixels import at_pixels
 
 UNEVEN = 0.01  # of the light, by which it changes over a radius: less changes little in the shade
+# Variances of its own by which this slope must differ from none: it is then known to a seventh. On a small circle noise
+# makes slopes of some per cent, of up to 40 variances, and a picture that is divided by them has another shade.
+SURE_SLOPE = 50.0
 CURVED = 0.1  # likewise, beyond a slope: what lamps that flicker make at 90 rows to a wave
 ROUNDS = 2  # of light that is found and divided by
 DARKEST = 0.3  # of the light at the circle: polynomials go astray beyond
@@ -23,7 +26,7 @@ DARKEST = 0.3  # of the light at the circle: polynomials go astray beyond
 
 def in_even_light(fit: DiscFit, patch: Patch, known: Prior) -> tuple[DiscFit, Patch]:
     """The fit, again in the light that it has at the circle where that explains the picture better, and its patch."""
-    if not fit.converged or np.max(np.abs(fit.values[WHITE_SLOPE])) < UNEVEN * fit.values[WHITE_GREY]:
+    if not fit.converged or not _is_uneven(fit):
         return fit, patch
     x, y = np.broadcast_arrays(patch.slope_x, patch.slope_y)
     squares = np.stack((x * x, x * y, y * y))
@@ -43,3 +46,10 @@ def in_even_light(fit: DiscFit, patch: Patch, known: Prior) -> tuple[DiscFit, Pa
     even = replace(patch, grey=uneven.grey)
     again = fit_disc(even, replace(known, start=start))
     return (again, even) if again.converged and again.residual < fit.residual else (fit, patch)
+
+
+def _is_uneven(fit: DiscFit) -> bool:
+    """Whether the white has a slope that matters and surely is one."""
+    slope, covariance = fit.values[WHITE_SLOPE], fit.covariance[WHITE_SLOPE, WHITE_SLOPE]
+    matters = np.max(np.abs(slope)) >= UNEVEN * fit.values[WHITE_GREY]
+    return bool(matters and slope @ np.linalg.solve(covariance, slope) >= SURE_SLOPE)

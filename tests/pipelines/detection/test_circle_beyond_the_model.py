@@ -11,6 +11,8 @@ from pipelines.detection import circle
 from pipelines.detection.board_map import BoardMap, grid
 from pipelines.detection.circle import find_circle
 from pipelines.detection.circle_blur import still
+from pipelines.detection.circle_even_light import in_even_light
+from pipelines.detection.circle_numbers import FURTHER, WHITE_GREY, WHITE_SLOPE, DiscFit
 from tests.pipelines.detection import test_circle as drawing
 from tests.supersampled import digitised
 
@@ -68,3 +70,13 @@ def test_lamps_that_flicker_move_a_circle_within_its_error(drawn, phase):
     error, deviations = off(drawing.found_in(picture, camera), camera)
     assert deviations**2 < 13.8  # 0.999 of a chi-square of two degrees of freedom
     assert phase != 3.0 or error < 0.02
+
+
+def test_a_slope_of_light_that_noise_may_have_made_is_not_divided_by():
+    """3 % over a radius, known to 1 %, as of a circle of 4 px in noise of 7 grey values; no pixel is looked at."""
+    values, covariance = np.zeros(FURTHER), np.eye(FURTHER)
+    values[WHITE_GREY], values[WHITE_SLOPE] = 100.0, (3.0, 2.0)
+    fit, patch = DiscFit(values, covariance, True, 49.0, 1.0, np.zeros(2), 0.0, np.zeros(2)), object()
+    assert in_even_light(fit, patch, None) == (fit, patch)
+    with pytest.raises(AttributeError):  # a slope that is sure is looked for in the pixels
+        in_even_light(replace(fit, covariance=0.1 * covariance), patch, None)
