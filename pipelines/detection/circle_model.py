@@ -86,11 +86,18 @@ def _open_share(v: Array, p: Array, per_px: Array, finer: int) -> tuple[Array, A
     """
     _, height, width = v.shape
     out, slopes = np.empty((height, width)), np.empty((5, height, width))
+    # Radii that a cell on the rim may lie from it: half a cell, at most as long as this, and a little for rounding.
+    longest = math.sqrt(per_px[0, 0] ** 2 + per_px[0, 1] ** 2 + per_px[1, 0] ** 2 + per_px[1, 1] ** 2) / finer
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
             u, w = v[0, i, j] - p[0], v[1, i, j] - p[1]
             a, b = u * (1.0 - p[3]) - w * p[4], w * (1.0 + p[3]) - u * p[4]
             radius = math.sqrt(a * a + b * b) + 1e-12
+            if abs(radius - p[2]) > 0.51 * longest:
+                out[i, j] = 0.0 if radius < p[2] else 1.0
+                for k in range(5):
+                    slopes[k, i, j] = 0.0
+                continue
             across = (per_px[0, 0] * a + per_px[1, 0] * b) / radius
             down = (per_px[0, 1] * a + per_px[1, 1] * b) / radius
             per_radius = finer / math.sqrt(across * across + down * down)  # fine cells

@@ -11,7 +11,7 @@ from pipelines.detection.board_map import BoardMap, grid
 from pipelines.detection.circle import find_circle
 from pipelines.detection.circle_blur import Blur, motion_blur
 from pipelines.detection.circle_patch import _streak
-from pipelines.detection.circle_pixels import _smeared
+from pipelines.detection.circle_pixels import _blurred, _smeared
 from pipelines.detection.corner_sites import chessboard_sites
 from render.targets.chessboard import Chessboard
 from tests.drawn_boards import Drawing
@@ -112,3 +112,16 @@ def test_a_streak_spreads_light_by_its_own_variance_and_leaves_its_middle():
     assert np.abs(mean).max() < 1e-12
     # Taps two cells apart, of which the outermost count by their share: a sixth of (2 / 3 px)^2 at most.
     assert np.abs(across - np.outer(streak, streak) / 12.0).max() < 0.08
+
+
+@pytest.mark.parametrize(("finer", "taps"), [(2, 8), (2, 10), (2, 12), (3, 9), (3, 11), (3, 13)])
+@pytest.mark.parametrize("count", [3, 20, 30])
+def test_a_blur_at_pixels_is_the_sum_over_its_taps(finer, taps, count):
+    """Of a grid that goes on as it ends, about the pixels' centres; four pixels at a time and three taps, or fewer."""
+    rng = np.random.default_rng(count)
+    fine, kernel = rng.random((5 * finer, 6 * finer)), rng.random(taps)
+    rows, columns = (np.ascontiguousarray(part[:count]) for part in np.nonzero(np.ones((5, 6))))
+    ended, first = np.pad(fine, taps, mode="edge"), taps + (finer - taps) // 2
+    windows = np.lib.stride_tricks.sliding_window_view(ended, (taps, taps))[first::finer, first::finer]
+    expected = np.einsum("nij,i,j->n", windows[rows, columns], kernel, kernel)
+    assert np.allclose(_blurred(fine, kernel, finer, rows, columns), expected, rtol=1e-13)
