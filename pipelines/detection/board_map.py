@@ -7,12 +7,15 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from eposit.arrays import Array, Mask
 from eposit.starts.homography import homography_start
 from pipelines.detection import generic_lens
 
 FOCAL_SHARES = (0.2, 0.3, 0.45, 0.7, 1.1, 2.0)  # focal lengths to start from, as shares of the picture's width
+PINHOLE_SHARES = (0.2, 0.3, 0.45, 0.7)  # likewise of pinhole cameras
+PINHOLE = 1.0 / 3.0, 2.0 / 15.0, 17.0 / 315.0  # k1, k2, k3: the series of a tangent
 WIDEST_RAD = 2.2  # largest angle of a ray that a start may give a corner
 START_CORNERS = 16  # that a start is worked out from
 FIT_STEPS = 100
@@ -85,10 +88,11 @@ class BoardMap:
         """The best of the fits from every start; see `fit`.
 
         A first map whose lens is a usual one may lead into a long valley of lenses that explain the corners less well:
-        where fx is twice fy, say.
+        where fx is twice fy, say, or in a part of a pinhole camera's picture, far from its centre.
         """
         used, held = weights > 0.0, _held(size, weights, hold)
-        starts = [replace(start, lift=lift) for start in _starts(at, corners_px, size, used)]
+        starts = [*_starts(at, corners_px, size, used), *_pinhole_starts(at, corners_px, size, used)]
+        starts = [replace(start, lift=lift) for start in starts]
         # Twice: the first fit may stop in a narrow valley.
         fits = [start.fitted(at, corners_px, weights, held).fitted(at, corners_px, weights, held) for start in starts]
         return min(fits, key=lambda fit: float(weights[used] @ np.sum((corners_px - fit(at))[used] ** 2, axis=1)))
@@ -189,10 +193,25 @@ def _held(size: tuple[int, int], weights: Array, hold: Hold) -> Array:
     return held
 
 
+def _pinhole_starts(at: Array, corners_px: Array, size: tuple[int, int], use: Mask) -> list[BoardMap]:
+    """Pinhole cameras with their axis at the picture's centre, each with the pose that its homography gives."""
+    centre, some = (np.array(size) - 1.0) / 2.0, _some(use)
+    focal = np.array(PINHOLE_SHARES) * size[0]
+    ahead = np.ones((len(focal), len(some), 1))
+    bearings = np.concatenate(((corners_px[some] - centre) / focal[:, None, None], ahead), axis=2)
+    bearings /= np.linalg.norm(bearings, axis=2, keepdims=True)
+    R, t = homography_start(np.column_stack((at[some], np.zeros(len(some)))), bearings)
+    return [BoardMap(R[i], t[i], np.array([focal[i], 0.0, *centre, *PINHOLE])) for i in range(len(focal))]
+
+
+def _some(use: Mask) -> NDArray[np.intp]:
+    """(m,) of the corners that take part those that a start is worked out from."""
+    return np.flatnonzero(use)[:: max(1, int(np.sum(use)) // START_CORNERS)]
+
+
 def _starts(at: Array, corners_px: Array, size: tuple[int, int], use: Mask) -> list[BoardMap]:
     """Equidistance lenses at the picture's centre, each with the pose that its homography gives; the best one first."""
-    centre = (np.array(size) - 1.0) / 2.0
-    some = np.flatnonzero(use)[:: max(1, int(np.sum(use)) // START_CORNERS)]
+    centre, some = (np.array(size) - 1.0) / 2.0, _some(use)
     points, offset = np.column_stack((at[some], np.zeros(len(some)))), corners_px[some] - centre
     radius = np.linalg.norm(offset, axis=1)
     shares = [share for share in FOCAL_SHARES if radius.max() / (share * size[0]) < WIDEST_RAD]

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from eposit.arrays import Array, Mask
 from pipelines.detection.consistency import Corners
 from render.targets.chessboard import Chessboard
+from render.targets.plain_chessboard import PlainChessboard
 
 BESIDE = 0.25  # squares to either side of a border at which grey values are compared
 LEAST_SQUARES = 5  # along a border, in the picture: fewer may look so by chance
@@ -19,24 +20,31 @@ SURELY_WHITE = 0.75  # of the way from black to white
 Side = tuple[Array, Array, Mask]
 
 
-def is_of_another_size(light: NDArray[np.float32], corners: Corners, at: Array, target: Chessboard) -> bool:
+def is_of_another_size(
+    light: NDArray[np.float32],
+    corners: Corners,
+    at: Array,
+    target: Chessboard | PlainChessboard,
+    exchanged: bool = False,
+) -> bool:
     """Whether the squares go on beyond the board's border, or end before it where no corner is seen.
 
-    light: the picture, (height, width). at: (n, 2) squares, places of the corners on the board.
+    light: the picture, (height, width). at: (n, 2) squares, places of the corners on the board. exchanged: whether the
+    board's black squares are white, and its white ones black.
     """
     columns, rows = target.columns, target.rows
     borders = [(axis, place) for axis, count in ((0, columns), (1, rows)) for place in (-1, count - 1)]
-    if any(_goes_on(light, corners, _side(target, *border)) for border in borders):
+    if any(_goes_on(light, corners, _side(target, *border, exchanged)) for border in borders):
         return True
     seen = np.rint(at[corners.consistent]).astype(int)
     if not len(seen):
         return False
     ends = [(axis, place) for axis in (0, 1) for place in (seen[:, axis].min() - 1, seen[:, axis].max() + 1)]
     inside = [end for end in ends if end not in borders]
-    return any(_stops(light, corners, _side(target, *end)) for end in inside)
+    return any(_stops(light, corners, _side(target, *end, exchanged)) for end in inside)
 
 
-def _side(target: Chessboard, axis: int, place: int) -> Side:
+def _side(target: Chessboard | PlainChessboard, axis: int, place: int, exchanged: bool) -> Side:
     """The squares along a line of the board, across `axis` at `place`, seen from the board's middle."""
     count = target.rows if axis == 0 else target.columns
     out = 1.0 if place > ((target.columns, target.rows)[axis] - 2) / 2.0 else -1.0
@@ -45,7 +53,7 @@ def _side(target: Chessboard, axis: int, place: int) -> Side:
         np.stack((np.full(count, place + way * out), along)[:: 1 if axis == 0 else -1], axis=1)
         for way in (-BESIDE, BESIDE)
     )
-    return within, beyond, np.floor(within).sum(axis=1) % 2 == 1
+    return within, beyond, (np.floor(within).sum(axis=1) % 2 == 1) != exchanged
 
 
 def _greys(light: NDArray[np.float32], corners: Corners, side: Side) -> tuple[Array, Array, Mask] | None:

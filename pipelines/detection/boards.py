@@ -26,6 +26,7 @@ from pipelines.detection.seen_points import SeenPoints
 from pipelines.detection.statuses import STATUS_TYPE, PointStatus
 from pipelines.detection.time_limit import Check
 from render.targets.chessboard import Chessboard
+from render.targets.plain_chessboard import PlainChessboard
 from render.targets.printed import PrintedBoard
 
 
@@ -44,6 +45,10 @@ def detect_printed(image: Grey, target: PrintedBoard, detector: str, check_time:
     good = placed.consistent
     if too_many_bad(good[seen.ids]):
         return nothing(count, PointStatus.CORNERS_INCONSISTENT, seen.finder)
+    if isinstance(target, PlainChessboard):
+        at = target.pattern_points / target.unit_mm
+        if is_of_another_size(np.asarray(image, np.float32), placed, at, target, seen.exchanged):
+            return nothing(count, PointStatus.OTHER_BOARD, seen.finder)
     status = np.where(good, PointStatus.OK, PointStatus.POINT_NOT_FOUND).astype(STATUS_TYPE)
     points = np.where(good[:, None], placed.points_px, np.nan)
     covariance = np.where(good[:, None, None], placed.covariance_px2, np.nan)

@@ -7,6 +7,7 @@ is off follows from the map from board to image, which is fitted to the centres.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import cv2
@@ -19,6 +20,7 @@ from pipelines.detection.consistency import Corners, drop_inconsistent
 from pipelines.detection.disc_candidates import groups_of_blobs, levels_of_blobs
 from pipelines.detection.disc_lattice import find_grid
 from pipelines.detection.finders import Grey, textured_region
+from pipelines.detection.next_map import next_map
 from pipelines.detection.seen_points import SeenPoints
 from pipelines.detection.time_limit import Check, unlimited
 from render.targets.circle_grid import CircleGrid
@@ -135,22 +137,35 @@ def refine_circles(image: Grey, board: BoardMap, target: CircleGrid, unit_mm: fl
     window = radius + CLEAR * (_nearest(at) - 2.0 * radius)
     if target.margin_mm < 0.5 * target.spacing_mm:
         window = min(window, radius + CLEAR * ((target.margin_mm + 0.5 * target.spacing_mm) / unit_mm - radius))
+    first = _seen_through(image, board, at, radius, window)
+    # A first map, through blobs, may be so far off that its windows cut discs.
+    seen = _seen_through(image, first.board, at, radius, window)
+    if not np.any(seen.consistent):
+        return seen
+    good = seen.consistent & _is_white_between(image, seen.board, at, seen.contrast)
+    covariance = np.where(good[:, None, None], seen.covariance_px2, np.eye(2))
+    return drop_inconsistent(replace(seen, covariance_px2=covariance, consistent=good), at, size)
+
+
+def _seen_through(image: Grey, board: BoardMap, at: Array, radius: float, window: float) -> Corners:
+    """The centres of the discs in windows that a map places, and the map through them.
+
+    None is consistent if they are too few. radius, window: in the board's unit.
+    """
+    size = (image.shape[1], image.shape[0])
     blobs = [_blob(image, board, place, radius, 0.5 * (radius + window)) for place in at]
     centroids, covariance = np.stack([blob.centroid for blob in blobs]), np.stack([blob.covariance for blob in blobs])
     good = np.all(np.isfinite(centroids), axis=1)
     side = np.sqrt(np.abs(np.linalg.det(board.jacobian(at))))
     good[good] = np.linalg.norm(centroids - board(at), axis=1)[good] < START_LIMIT * side[good]
-    nothing = Corners(centroids, covariance, good, float("nan"), float("nan"), board)
+    seen = Corners(centroids, covariance, good, float("nan"), float("nan"), board)
     if 2 * np.sum(good) <= board.slopes(at).shape[-1]:
-        return Corners(centroids, covariance, np.zeros(len(at), bool), nothing.blur_px, nothing.contrast, board)
-    weights, points = np.where(good, 1.0, 0.0), centroids
+        return replace(seen, consistent=np.zeros(len(at), bool))
     for _ in range(ROUNDS):
-        points = centroids + _centre_offsets(board, at, radius)
-        board = BoardMap.fit(at, points, size, weights, board)
+        seen = replace(seen, points_px=centroids + _centre_offsets(seen.board, at, radius))
+        seen = replace(seen, board=next_map(seen, seen.board, at, size))
     contrast = float(np.median([blob.contrast for blob, use in zip(blobs, good, strict=True) if use]))
-    good &= _is_white_between(image, board, at, contrast)
-    covariance[~good] = np.eye(2)
-    return drop_inconsistent(Corners(points, covariance, good, float("nan"), contrast, board), at, size)
+    return replace(seen, contrast=contrast)
 
 
 def _is_white_between(image: Grey, board: BoardMap, at: Array, contrast: float) -> bool:
