@@ -59,6 +59,7 @@ def _find_in(image: Grey, target: CircleGrid, check_time: Check) -> Array | None
     for blobs in levels_of_blobs(image):
         check_time()
         for points in groups_of_blobs(blobs, distance, count)[:MOST_GROUPS]:
+            check_time()
             ways = find_grid(points, target)
             if ways and blobs.inside(ways[0]) <= MOST_INSIDE * count:
                 return _outline_centres(image, _upright(ways, target))
