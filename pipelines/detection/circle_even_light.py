@@ -17,7 +17,7 @@ from pipelines.detection.circle_pixels import at_pixels
 
 UNEVEN = 0.01  # of the light, by which it changes over a radius: less changes little in the shade
 # Variances of its own by which this slope must differ from none: it is then known to a seventh. On a small circle noise
-# makes slopes of some per cent, of up to 40 variances, and a picture that is divided by them has another shade.
+# makes slopes of some per cent, mostly below 40 variances, and a picture that is divided by them has another shade.
 SURE_SLOPE = 50.0
 CURVED = 0.1  # likewise, beyond a slope: what lamps that flicker make at 90 rows to a wave
 ROUNDS = 2  # of light that is found and divided by

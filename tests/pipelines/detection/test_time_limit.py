@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from pipelines.detection import Detector, detect_points, time_limit
+from pipelines.detection.circle_grids import find_circle_grid
+from pipelines.detection.disc_candidates import levels_of_blobs
 from pipelines.detection.time_limit import DETECT_SECONDS, TimeLimit, TooLateError
 from render.targets.aprilgrid import AprilGrid
 from render.targets.charuco import Charuco
@@ -68,3 +70,12 @@ def test_it_is_looked_at_for_printed_boards(target, clock):
     looks_for_markers = isinstance(target, Charuco | AprilGrid)
     found = detect_points(Drawing(circle=None).image(), target, seconds=0.5)
     assert set(found.status) == {"board_not_found" if looks_for_markers else "too_late"}
+
+
+def test_it_is_looked_at_for_each_group_of_discs():
+    """Waves like those of an egg crate make so many groups at one level that 12 megapixels took 2.5 s."""
+    y, x = np.mgrid[0:600, 0:800]
+    waves = (127.0 + 100.0 * np.sin(0.4 * x) * np.sin(0.37 * y)).astype(np.uint8)
+    looks: list[int] = []
+    assert find_circle_grid(waves, CircleGrid(), lambda: looks.append(1)) is None
+    assert len(looks) > len(list(levels_of_blobs(waves)))
