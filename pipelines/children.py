@@ -18,6 +18,8 @@ from typing import Any
 PR_SET_PDEATHSIG = 1  # of Linux's prctl
 HELD_BACK = tuple(getattr(signal, name) for name in ("SIGINT", "SIGHUP", "SIGTERM") if hasattr(signal, name))
 PATIENCE_S = 5.0  # within which a process that was killed ends
+# What a pipe raises whose other end has gone: a reset where something that was sent to it had not been read.
+OTHER_END_GONE = (EOFError, BrokenPipeError, ConnectionResetError)
 
 
 @dataclass

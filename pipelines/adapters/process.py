@@ -15,7 +15,7 @@ from eposit import Status
 from pipelines.adapters.limits import Limits, lift_memory_limit, limit_memory
 from pipelines.adapters.results import PoseResult
 from pipelines.adapters.user import attempt, check_call, load_function
-from pipelines.children import Child, start
+from pipelines.children import OTHER_END_GONE, Child, start
 
 START_S = 120.0  # for starting the process and importing the function, at least: a crowded machine takes its time
 
@@ -132,6 +132,8 @@ def _serve(pipe: Connection, name: str, form: Form, limits: Limits) -> None:
     except (MemoryError, OutOfMemoryError):
         lift_memory_limit()
         pipe.send(f"ran out of memory, of which --memory-mb allows {limits.memory_mb} MB")
+    except OTHER_END_GONE:  # with the worker that asked: nobody is left to be told
+        return
     except Exception as error:
         sys.exit(f"{form.option} {name} broke its own process ({type(error).__name__}: {error})")
 
@@ -156,8 +158,6 @@ def _answer_calls(pipe: Connection, name: str, form: Form) -> None:
         pipe.send(error)
     except RaisedToEndError as error:
         pipe.send(UserError(f"{what}: importing it failed with {error}; mend it"))
-    except EOFError:
-        return
 
 
 class OutOfMemoryError(BaseException):

@@ -5,18 +5,18 @@ from __future__ import annotations
 import pickle
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import Any
+
+from pipelines.children import OTHER_END_GONE
 
 
 def serve(pipe: Connection, run_one: Callable[[Any], Any]) -> None:
     """Receive tasks; send back (result, None, "") of each, or (None, exception, traceback)."""
-    while True:
-        try:
-            task = pipe.recv()
-        except EOFError:
-            return
-        pipe.send(_outcome(run_one, task))
+    with suppress(*OTHER_END_GONE):
+        while True:
+            pipe.send(_outcome(run_one, pipe.recv()))
 
 
 def _outcome(run_one: Callable[[Any], Any], task: Any) -> tuple[Any, BaseException | None, str]:
