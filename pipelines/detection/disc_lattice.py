@@ -107,26 +107,33 @@ def _claimed(points: Array, tree: cKDTree, expected: Array, within: Array, taken
 
 def _laid(grid: Grid, target: CircleGrid) -> list[Array]:
     """All ways in which the target's discs lie on discs of the lattice; none if different discs may be the target."""
-    cells = _cells(target)
+    cells, known = _cells(target), grid.known
     ways: list[Array] = []
+    first: set[tuple[float, ...]] = set()
     for turn in TURNS:
         own = cells @ turn.T
         own -= own.min(axis=0)
-        ways += _shifted(grid, own)
-    first = {tuple(point) for point in ways[0].tolist()} if ways else set()
-    return ways if all({tuple(point) for point in way.tolist()} == first for way in ways) else []
-
-
-def _shifted(grid: Grid, own: NDArray[np.int64]) -> list[Array]:
-    """Points of the lattice at cells (n, 2), columns and rows, shifted so that each is known."""
-    rows, columns = grid.points.shape[:2]
-    across, down = own.max(axis=0)
-    ways = []
-    for x, y in product(range(columns - across), range(rows - down)):
-        way = grid.points[own[:, 1] + y, own[:, 0] + x]
-        if np.all(np.isfinite(way)):
+        for x, y in _shifts(known, own):
+            way = grid.points[own[:, 1] + y, own[:, 0] + x]
+            discs = set(map(tuple, way.tolist()))
+            first = first or discs
+            if discs != first:
+                return []
             ways.append(way)
     return ways
+
+
+def _shifts(known: Mask, own: NDArray[np.int64]) -> list[tuple[int, int]]:
+    """By how many columns and rows cells (n, 2) can be shifted so that each is known."""
+    (rows, columns), (across, down) = known.shape, own.max(axis=0)
+    if columns <= across or rows <= down:
+        return []
+    fits = np.ones((rows - down, columns - across), bool)
+    for column, row in own.tolist():
+        fits &= known[row : row + fits.shape[0], column : column + fits.shape[1]]
+        if not fits.any():
+            return []
+    return [(int(x), int(y)) for x, y in np.argwhere(fits.T)]
 
 
 def _cells(target: CircleGrid) -> NDArray[np.int64]:

@@ -31,7 +31,10 @@ class Grid(NamedTuple):
 
     def padded(self, by: int) -> Grid:
         """With so many unknown columns and rows on each side."""
-        return Grid(np.pad(self.points, ((by, by), (by, by), (0, 0)), constant_values=np.nan), self.white_first)
+        rows, columns = self.points.shape[:2]
+        points = np.full((rows + 2 * by, columns + 2 * by, 2), np.nan)  # a third of the time of np.pad
+        points[by : by + rows, by : by + columns] = self.points
+        return Grid(points, self.white_first)
 
     def cropped(self) -> Grid:
         """Without columns and rows in which nothing is known."""
