@@ -71,21 +71,44 @@ def _smeared(fine: Array, shares: Array, shifts: Places) -> Array:
 
     Beyond its border the grid goes on as it ends.
     """
-    height, width = fine.shape
+    (height, width), count = fine.shape, len(shares)
+    side = 0
+    for n in range(count):
+        side = max(side, abs(shifts[n, 0]))
+    wide = _widened(fine, side)
     out = np.zeros((height, width))
-    for n in range(len(shares)):
-        across, down = shifts[n]
-        first, last = min(max(-across, 0), width), max(min(width - across, width), 0)
-        for i in range(height):
-            row = 0 if i + down < 0 else height - 1 if i + down >= height else i + down
-            line, own = fine[row, first + across : last + across], out[i, first:last]
-            for j in range(first):
-                out[i, j] += shares[n] * fine[row, 0]
-            for j in range(len(own)):
+    last, fours = height - 1, count - count % 4
+    for i in range(height):
+        own = out[i]
+        # Four shares at once, so that a sum is read and written once for them.
+        for n in range(0, fours, 4):
+            p, q, r, s = shares[n], shares[n + 1], shares[n + 2], shares[n + 3]
+            e, f, g, h = shifts[n, 0], shifts[n + 1, 0], shifts[n + 2, 0], shifts[n + 3, 0]
+            a = wide[min(max(i + shifts[n, 1], 0), last), side + e : side + e + width]
+            b = wide[min(max(i + shifts[n + 1, 1], 0), last), side + f : side + f + width]
+            c = wide[min(max(i + shifts[n + 2, 1], 0), last), side + g : side + g + width]
+            d = wide[min(max(i + shifts[n + 3, 1], 0), last), side + h : side + h + width]
+            for j in range(width):
+                own[j] = own[j] + p * a[j] + q * b[j] + r * c[j] + s * d[j]
+        for n in range(fours, count):
+            first = side + shifts[n, 0]
+            line = wide[min(max(i + shifts[n, 1], 0), last), first : first + width]
+            for j in range(width):
                 own[j] += shares[n] * line[j]
-            for j in range(last, width):
-                out[i, j] += shares[n] * fine[row, width - 1]
     return out
+
+
+@compiled_part
+def _widened(fine: Array, side: int) -> Array:
+    """(h, w + 2 side) a grid (h, w) that goes on to either side as it ends."""
+    height, width = fine.shape
+    wide = np.empty((height, width + 2 * side))
+    for i in range(height):
+        for j in range(side):
+            wide[i, j], wide[i, side + width + j] = fine[i, 0], fine[i, width - 1]
+        for j in range(width):
+            wide[i, side + j] = fine[i, j]
+    return wide
 
 
 def prepare() -> None:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from eposit.arrays import Array
 from pipelines.detection.board_map import SEEN_CORNERS, BoardMap
+from pipelines.detection.border_lines import MOST, Line, share_of_corners
 from pipelines.detection.generic_lens import PARAMETERS
 from pipelines.detection.grid_steps import axes
 from pipelines.detection.identity import AnyChessboard, Placement, identify
@@ -41,6 +42,7 @@ ENOUGH_PX = 16.0  # px of a level to a square: more show no more corners
 TOLD = (PointStatus.OK, PointStatus.MIRRORED)  # what is said where the picture tells which corner is which
 CHANCE_SHARE = 0.6  # of an outermost line's places: fewer points beside a full line may be of other things' edges
 CHANCE_LIKENESS = 0.95  # of the median likeness: they are, if they look less like corners
+MOST_END_LINES = 10  # of a lattice, in excess of the board's: more are a texture's
 FARTHEST_GAP = 8  # columns and rows over which a lattice is looked for beyond what hides it
 
 
@@ -109,7 +111,7 @@ def _told(level: LevelOf, smoothed: Level, grid: Grid, target: AnyChessboard) ->
     if not _is_whole(firm, target):
         firm = _firm_part(smoothed, _bridged(level, smoothed, firm, target))
     if _is_too_large(firm, target):
-        firm = _without_chance_lines(smoothed, firm)
+        firm = _without_chance_lines(level, smoothed, firm, target)
     count = int(np.sum(firm.known))
     if count < LEAST_POINTS:
         return None
@@ -144,8 +146,12 @@ def _is_too_large(grid: Grid, target: AnyChessboard) -> bool:
     return any(own > most for own, most in zip(sorted(grid.points.shape[:2]), sorted(target.inner), strict=True))
 
 
-def _without_chance_lines(smoothed: Level, grid: Grid) -> Grid:
-    """The lattice without outermost lines that few points make, each less like a corner, beside a line that is full."""
+def _without_chance_lines(level: LevelOf, smoothed: Level, grid: Grid, target: AnyChessboard) -> Grid:
+    """The lattice without outermost lines that few points make, each less like a corner, beside a line that is full.
+
+    As long as it is larger than the board, without outermost lines beyond which no squares follow, too: on the margin
+    the edges of shadows make points that look like corners.
+    """
     like, points = looks(smoothed, grid)[0], grid.points.copy()
     typical = median_of_known(like)
     for own, beside in ((0, 1), (-1, -2)):
@@ -154,7 +160,34 @@ def _without_chance_lines(smoothed: Level, grid: Grid) -> Grid:
             is_sparse = np.mean(np.isfinite(line)) <= CHANCE_SHARE and np.all(np.take(grid.known, beside, axis))
             if is_sparse and median_of_known(line) < CHANCE_LIKENESS * typical:
                 points[(slice(None),) * axis + (own,)] = np.nan
-    return grid.with_points(points).cropped()
+    grid = grid.with_points(points).cropped()
+    return _without_end_lines(level, grid, target) if _is_too_large(grid, target) else grid
+
+
+def _without_end_lines(level: LevelOf, grid: Grid, target: AnyChessboard) -> Grid:
+    """Without outermost lines, those that look least like corners first, until it is as large as the board or all do.
+
+    A lattice that is larger by many lines is left as it is.
+    """
+    is_near = sum(grid.points.shape[:2]) <= sum(target.inner) + MOST_END_LINES
+    board = _map(grid, level) if is_near and np.sum(grid.known) >= LEAST_POINTS else None
+    if board is None:
+        return grid
+    part, (rows, columns) = grid, grid.points.shape[:2]
+    ends = np.array(((0, columns - 1), (0, rows - 1)))
+    for _ in range(MOST_END_LINES):
+        lines = [Line(axis, int(ends[axis, k]), 2 * k - 1, *ends[1 - axis].tolist()) for axis in (0, 1) for k in (0, 1)]
+        shares = [share_of_corners(level.grey, board, line, grid.white_first) for line in lines]
+        least = int(np.argmin([1.0 if share is None else share for share in shares]))
+        share = shares[least]
+        if share is None or share >= MOST or not _is_too_large(part, target):
+            break
+        ends.flat[least] -= lines[least].out
+        (left, right), (top, bottom) = ends.tolist()
+        points = np.full_like(grid.points, np.nan)
+        points[top : bottom + 1, left : right + 1] = grid.points[top : bottom + 1, left : right + 1]
+        part = grid.with_points(points).cropped()
+    return part
 
 
 def _firm_part(smoothed: Level, grid: Grid) -> Grid:

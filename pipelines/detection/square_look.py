@@ -18,6 +18,8 @@ PLACES = np.stack([part.ravel() for part in np.meshgrid(INNER, INNER)], axis=-1)
 LIGHT_REACH = 1.5  # squares: how far the grey of other squares of its colour counts for a square's own
 CLEAR_SHARE = 0.2  # of the disc's area: a square with less darkness holds no disc
 UNEVEN = 0.2  # darkness that light and noise make on white
+SHADOW = 0.75  # darkness that shadows make on white: what is darker is print
+MOSTLY_CLEAR = 0.85  # of the squares: in deeper shadows, which show more of it, print is not told from them
 DISC_SHARES = (0.4, 2.2)  # of the disc's area, with its shadow
 DISC_OFF = 0.38  # squares that the middle of the disc may lie from that of the square: it stands above the board
 DISC_SPREAD = 1.7  # of a disc's mean square distance from its middle, which other dark shapes exceed
@@ -58,8 +60,8 @@ def look_at_squares(level: Level, board: BoardMap, grid: Grid, radius: float | N
     discs = np.full(white.shape, UNKNOWN)
     if radius is not None:
         dark = (levels[1][..., None] - grey) / np.maximum(levels[1] - levels[0], 1e-6)[..., None]
-        discs = _classified(np.where(white[..., None], dark, 1.0 - dark).reshape(white.size, -1), radius)
-        discs = discs.reshape(white.shape)
+        dark = np.where(white[..., None], dark, 1.0 - dark).reshape(white.size, -1)
+        discs = _found_in_shadows(_classified(dark, radius, UNEVEN), dark, radius).reshape(white.shape)
     return Look(discs, *_ends(level, board, white, levels.mean(axis=0), margin))
 
 
@@ -80,7 +82,17 @@ def _levels(grey: Array, white: Mask) -> Array:
     return levels
 
 
-def _classified(dark: Array, radius: float) -> NDArray[np.int64]:
+def _found_in_shadows(discs: NDArray[np.int64], dark: Array, radius: float) -> NDArray[np.int64]:
+    """(n,) what squares hold, with a disc that shadows across its square hide, which are less dark than print.
+
+    discs: (n,) what they hold otherwise. dark: see `_classified`.
+    """
+    deep = _classified(dark, radius, SHADOW)
+    is_told = np.sum(deep == DISC) == 1 and np.mean(deep[np.isfinite(dark).all(axis=1)] == CLEAR) >= MOSTLY_CLEAR
+    return np.where((discs == UNKNOWN) & (deep == DISC), DISC, discs) if is_told else discs
+
+
+def _classified(dark: Array, radius: float, least: float) -> NDArray[np.int64]:
     """(n,) what squares hold, from how dark their places (n, m) are: 0 white, 1 black, NaN out of view.
 
     Of black squares, from how bright they are. Of blurred discs the darkness is summed, which is as much as that of
@@ -88,7 +100,7 @@ def _classified(dark: Array, radius: float) -> NDArray[np.int64]:
     """
     u, v = PLACES.T
     area = float(np.mean(np.hypot(u, v) < radius))
-    whole, dark = np.isfinite(dark).all(axis=1), np.clip(dark - UNEVEN, 0.0, 1.0) / (1.0 - UNEVEN)
+    whole, dark = np.isfinite(dark).all(axis=1), np.clip(dark - least, 0.0, 1.0) / (1.0 - least)
     share, total = dark.mean(axis=1) / area, np.maximum(dark.sum(axis=1), 1e-6)
     mean_u, mean_v = dark @ u / total, dark @ v / total
     spread = dark @ (u**2 + v**2) / total - mean_u**2 - mean_v**2

@@ -3,6 +3,7 @@
 from tests.stress import surroundings as around
 from tests.stress.boards import Board
 from tests.stress.kind import Kind
+from tests.stress.kinds.light import blinds
 from tests.stress.views import Framing
 
 BEND = 8.0 / (1000.0 * 1000.0)  # 1 / mm for each mm of sag over the board's metre
@@ -35,4 +36,8 @@ KINDS = (
     Kind("smaller-asked", "8 x 7 squares asked of a board of 10 x 7", asked=Board(columns=8), nothing=True),
     Kind("smaller-asked-2", "10 x 7 squares asked of a board of 13 x 10", board=Board(columns=13, rows=10),
          asked=Board(), nothing=True),
+    Kind("blinds-larger", "10 x 7 squares asked of a board of 8 x 7 in stripes of shadow", board=Board(columns=8),
+         asked=Board(), light=blinds(0.25), nothing=True),
+    Kind("blinds-mirrored", "a mirrored board in stripes of shadow", board=Board(mirrored=True), light=blinds(0.25),
+         nothing=True),
 )  # fmt: skip
