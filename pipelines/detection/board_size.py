@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from eposit.arrays import Array
 from pipelines.detection.board_map import BoardMap
-from pipelines.detection.border_lines import Line, goes_on, share_of_corners
+from pipelines.detection.border_lines import Line, corner_places, goes_on, share_of_corners
 from pipelines.detection.consistency import Corners
 from pipelines.detection.sampling import sample
 from render.targets.chessboard import Chessboard
@@ -16,6 +16,7 @@ from render.targets.plain_chessboard import PlainChessboard
 BESIDE = 0.25  # squares to either side of a line at which grey values are compared
 LEAST_SQUARES = 5  # along a line, in the picture: fewer may look so by chance
 MOST = 0.85  # share of them that must look so
+SEEN_WELL = 0.5  # share of a line's corners
 SHADED_WHITE = 0.15  # of the way from black to the brightest white: shadows leave more of white, and black has less
 # Share of a line's places that look like corners and of the squares beyond it that are dark, together: shadows make as
 # many where the board has ended.
@@ -29,7 +30,7 @@ def is_of_another_size(
     target: Chessboard | PlainChessboard,
     exchanged: bool = False,
 ) -> bool:
-    """Whether the squares go on beyond the board's border, or end before it where no corner is seen.
+    """Whether the squares go on beyond the board's border, end before it, or go on across a line of its corners.
 
     light: the picture, (height, width). at: (n, 2) squares, places of the corners on the board. exchanged: whether the
     board's black squares are white, and its white ones black.
@@ -41,8 +42,17 @@ def is_of_another_size(
     seen = np.zeros(target.inner, bool)
     column, row = np.rint(at[corners.consistent]).astype(int).T
     seen[column, row] = True
-    lines = [(axis, int(place)) for axis in (0, 1) for place in np.flatnonzero(~seen.all(axis=1 - axis))]
-    return any(_stops(light, corners.board, _line(sizes, *line), exchanged) for line in lines)
+    return any(
+        _contradicts(light, corners.board, _line(sizes, axis, place), exchanged, is_end=is_end)
+        for axis in (0, 1)
+        for place, is_end in _lines_in_part(seen.mean(axis=1 - axis))
+    )
+
+
+def _lines_in_part(shares: Array) -> list[tuple[int, bool]]:
+    """Lines (n,) of which not all corners are seen, and whether all that are seen well lie to one side of them."""
+    well = np.flatnonzero(shares >= SEEN_WELL)
+    return [(int(k), bool(np.all(well >= k) or np.all(well <= k))) for k in np.flatnonzero(shares < 1.0)]
 
 
 def _line(sizes: tuple[int, int], axis: int, place: int) -> Line:
@@ -50,9 +60,12 @@ def _line(sizes: tuple[int, int], axis: int, place: int) -> Line:
     return Line(axis, place, 1 if place > (sizes[axis] - 2) / 2.0 else -1, 0, sizes[1 - axis] - 2)
 
 
-def _stops(light: NDArray[np.float32], board: BoardMap, line: Line, exchanged: bool) -> bool:
-    """Whether black and white squares are followed by what is no board, and looks a little like one by its shadows."""
-    share = share_of_corners(light, board, line, exchanged)
+def _contradicts(light: NDArray[np.float32], board: BoardMap, line: Line, exchanged: bool, *, is_end: bool) -> bool:
+    """Whether a line is seen that is none of the board's: squares go on across it, or end at it.
+
+    is_end: whether they may end there.
+    """
+    share = share_of_corners(corner_places(light, board, line, exchanged))
     if share is None or share > MOST_ALIKE:
         return False
     along = np.arange(line.first, line.last + 2) - 0.5
@@ -65,8 +78,10 @@ def _stops(light: NDArray[np.float32], board: BoardMap, line: Line, exchanged: b
     low, high = np.median(greys[0][seen & ~white]), np.max(greys[0][seen & white])  # most of it may be in shadows
     if not high > low:
         return False
-    is_white = (greys[:, seen] - low) / (high - low) > SHADED_WHITE
-    return bool(np.mean(is_white[0] == white[seen]) >= MOST and share + np.mean(~is_white[1]) <= MOST_ALIKE)
+    is_white, white = (greys[:, seen] - low) / (high - low) > SHADED_WHITE, white[seen]
+    inside, across = np.mean(is_white == white, axis=1)
+    ends = is_end and share + np.mean(~is_white[1]) <= MOST_ALIKE
+    return bool(inside >= MOST and (ends or across >= MOST))
 
 
 def _places(line: Line, along: Array, way: float) -> Array:

@@ -16,8 +16,8 @@ from pipelines.detection.sampling import Level, sample
 
 NEAR, FAR = 0.2, 0.3  # squares from the two lines through a corner, at which the squares around it are looked at
 BRIGHTER = 2.0  # times as far above black as the dark squares: shadows halve the light, print takes nine tenths of it
-LEAST_CORNERS = 4  # of a line, in view: fewer may look so by chance
-MOST = 0.8  # share of them that must look like corners; the edges of shadows make a quarter of a border's places so
+LEAST_PLACES = 4  # of a line, in view: fewer may look so by chance
+MOST = 0.6  # share of them that look like corners: some may be covered; shadows make up to a third of a border's so
 
 
 class Line(NamedTuple):
@@ -31,13 +31,19 @@ class Line(NamedTuple):
 
 
 def goes_on(level: Level, board: BoardMap, line: Line, white_first: bool) -> bool:
-    """Whether squares of both colours are seen to follow beyond the line; see `share_of_corners`."""
-    share = share_of_corners(level, board, line, white_first)
+    """Whether squares of both colours are seen to follow beyond the line; see `corner_places`."""
+    share = share_of_corners(corner_places(level, board, line, white_first))
     return share is not None and share >= MOST
 
 
-def share_of_corners(level: Level, board: BoardMap, line: Line, white_first: bool) -> float | None:
-    """Of the line's places those around which squares look as around a corner; None if too few are in view.
+def share_of_corners(places: Array) -> float | None:
+    """Of a line's places (n,), see `corner_places`, those that look like corners; None if too few are in view."""
+    seen = np.isfinite(places)
+    return float(np.mean(places[seen])) if np.sum(seen) >= LEAST_PLACES else None
+
+
+def corner_places(level: Level, board: BoardMap, line: Line, white_first: bool) -> Array:
+    """(n,) 1 where squares look as around a corner of a line, 0 where they do not, NaN out of view.
 
     board: map from column and row of the lattice to the picture. white_first: whether the square before the lattice's
     first column and row is white.
@@ -45,13 +51,12 @@ def share_of_corners(level: Level, board: BoardMap, line: Line, white_first: boo
     within, beyond, white = _around(line, white_first)
     greys = [sample(level, board(part.reshape(-1, 2)).reshape(part.shape)).mean(axis=-1) for part in (within, beyond)]
     seen = np.isfinite(greys[0]) & np.isfinite(greys[1])
-    both = seen.all(axis=1)
-    if np.sum(both) < LEAST_CORNERS:
-        return None
+    if not np.any(seen & ~white):
+        return np.full(len(white), np.nan)
     within, beyond = (grey - np.median(greys[0][seen & ~white]) for grey in greys)
     bright = np.where(white, within, beyond).min(axis=1)
     dark = np.where(white, beyond, within).max(axis=1)
-    return float(np.mean((bright > BRIGHTER * np.maximum(dark, 0.0))[both]))
+    return np.where(seen.all(axis=1), bright > BRIGHTER * np.maximum(dark, 0.0), np.nan)
 
 
 def _around(line: Line, white_first: bool) -> tuple[Array, Array, Mask]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from eposit.arrays import Array
 from pipelines.detection.board_map import SEEN_CORNERS, BoardMap
-from pipelines.detection.border_lines import MOST, Line, share_of_corners
+from pipelines.detection.border_lines import MOST, Line, corner_places
 from pipelines.detection.generic_lens import PARAMETERS
 from pipelines.detection.grid_steps import axes
 from pipelines.detection.identity import AnyChessboard, Placement, identify
@@ -177,10 +177,9 @@ def _without_end_lines(level: LevelOf, grid: Grid, target: AnyChessboard) -> Gri
     ends = np.array(((0, columns - 1), (0, rows - 1)))
     for _ in range(MOST_END_LINES):
         lines = [Line(axis, int(ends[axis, k]), 2 * k - 1, *ends[1 - axis].tolist()) for axis in (0, 1) for k in (0, 1)]
-        shares = [share_of_corners(level.grey, board, line, grid.white_first) for line in lines]
-        least = int(np.argmin([1.0 if share is None else share for share in shares]))
-        share = shares[least]
-        if share is None or share >= MOST or not _is_too_large(part, target):
+        shares = [_share_of_corners(level, grid, board, line) for line in lines]
+        least = int(np.argmin(shares))
+        if shares[least] >= MOST or not _is_too_large(part, target):
             break
         ends.flat[least] -= lines[least].out
         (left, right), (top, bottom) = ends.tolist()
@@ -188,6 +187,17 @@ def _without_end_lines(level: LevelOf, grid: Grid, target: AnyChessboard) -> Gri
         points[top : bottom + 1, left : right + 1] = grid.points[top : bottom + 1, left : right + 1]
         part = grid.with_points(points).cropped()
     return part
+
+
+def _share_of_corners(level: LevelOf, grid: Grid, board: BoardMap, line: Line) -> float:
+    """Of the points that are known on a line, those around which squares look as around a corner; 0 of none.
+
+    A line that is covered in part has few points, but these are corners.
+    """
+    across = grid.known[:, line.place] if line.axis == 0 else grid.known[line.place]
+    places = corner_places(level.grey, board, line, grid.white_first)
+    told = places[across[line.first : line.last + 1] & np.isfinite(places)]
+    return float(np.mean(told)) if len(told) else 0.0
 
 
 def _firm_part(smoothed: Level, grid: Grid) -> Grid:

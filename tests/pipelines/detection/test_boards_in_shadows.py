@@ -8,7 +8,7 @@ from scipy.ndimage import gaussian_filter
 
 from pipelines.detection import detect_points
 from pipelines.detection.board_map import BoardMap
-from pipelines.detection.border_lines import Line, goes_on, share_of_corners
+from pipelines.detection.border_lines import Line, corner_places, goes_on, share_of_corners
 from render.targets.chessboard import Chessboard
 from render.targets.plain_chessboard import PlainChessboard
 from tests.drawn_boards import Drawing
@@ -18,12 +18,12 @@ BASE = {"width": 640, "height": 480, "focal_px": 340.0, "distance": 9.0, "cells"
 WITH_CIRCLE, PLAIN = Drawing(**BASE), Drawing(**BASE, circle=None)
 # Direction of the stripes' normal, degrees; their period, px; light that is left. Without looking at whether squares
 # go on, all of these are `other_board`.
-STRIPES = [(150.0, 47.0, 0.5), (62.0, 47.0, 0.35), (62.0, 75.0, 0.25)]
+STRIPES = [(150.0, 47.0, 0.5), (62.0, 47.0, 0.35), (62.0, 60.0, 0.25)]
 MOST_NORM = 1.5  # of the errors over those stated: 1.3 for the deepest, where some corners have a shadow's edge on them
 WITH_CIRCLE, PLAIN = Drawing(**BASE), Drawing(**BASE, circle=None)
 # Direction of the stripes' normal, degrees; their period, px; light that is left. Without looking at whether squares
 # go on, all of these are `other_board`.
-STRIPES = [(150.0, 47.0, 0.5), (62.0, 47.0, 0.35), (62.0, 75.0, 0.25)]
+STRIPES = [(150.0, 47.0, 0.5), (62.0, 47.0, 0.35), (62.0, 60.0, 0.25)]
 FAR = 6.0  # stated deviations of a point: none of a few hundred is as far off, whatever shadows add to its noise
 
 
@@ -75,7 +75,7 @@ def test_there_a_mirrored_board_is_none(left):
 def board():
     """Grey values of a board in deep stripes, and the map from column and row to the picture."""
     places, size = PLAIN.corners[:, :2], (PLAIN.width, PLAIN.height)
-    image = in_stripes(PLAIN, 62.0, 75.0, 0.25).astype(np.float32)
+    image = in_stripes(PLAIN, 62.0, 60.0, 0.25).astype(np.float32)
     return image, BoardMap.fit(places, PLAIN.truth(), size, np.ones(len(places)))
 
 
@@ -83,17 +83,17 @@ def board():
 def test_around_corners_squares_go_on(board, axis):
     for place in range((9, 6)[axis]):
         for out in (-1, 1):
-            assert share_of_corners(*board, Line(axis, place, out, 0, (5, 8)[axis]), white_first=False) == 1.0
+            assert np.all(corner_places(*board, Line(axis, place, out, 0, (5, 8)[axis]), white_first=False) == 1.0)
 
 
 @pytest.mark.parametrize(("axis", "place", "out"), [(0, -1, -1), (0, 9, 1), (1, -1, -1), (1, 6, 1)])
 def test_beyond_a_border_they_do_not(board, axis, place, out):
     line = Line(axis, place, out, 0, (5, 8)[axis])
-    assert share_of_corners(*board, line, white_first=False) < 0.4
+    assert share_of_corners(corner_places(*board, line, white_first=False)) < 0.4
     assert not goes_on(*board, line, white_first=False)
 
 
 def test_too_few_places_in_view_say_nothing(board):
     light, whole = board
-    assert share_of_corners(light, whole, Line(0, 4, 1, 0, 2), white_first=False) is None
-    assert share_of_corners(light[:40], whole, Line(0, 4, 1, 0, 5), white_first=False) is None
+    assert share_of_corners(corner_places(light, whole, Line(0, 4, 1, 0, 2), white_first=False)) is None
+    assert np.all(np.isnan(corner_places(light[:40], whole, Line(0, 4, 1, 0, 5), white_first=False)))
