@@ -179,7 +179,7 @@ def _without_end_lines(level: LevelOf, grid: Grid, target: AnyChessboard) -> Gri
         lines = [Line(axis, int(ends[axis, k]), 2 * k - 1, *ends[1 - axis].tolist()) for axis in (0, 1) for k in (0, 1)]
         shares = [_share_of_corners(level, grid, board, line) for line in lines]
         least = int(np.argmin(shares))
-        if shares[least] >= MOST or not _is_too_large(part, target):
+        if shares[least] >= MOST or not _is_too_large(part, target) or np.any(ends[:, 0] >= ends[:, 1]):
             break
         ends.flat[least] -= lines[least].out
         (left, right), (top, bottom) = ends.tolist()

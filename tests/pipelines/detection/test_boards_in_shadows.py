@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from pipelines.detection import detect_points
+from pipelines.detection import detect_points, lattice_finder
 from pipelines.detection.board_map import BoardMap
 from pipelines.detection.border_lines import Line, corner_places, goes_on, share_of_corners
+from pipelines.detection.lattice_grid import Grid
+from pipelines.detection.levels import LevelOf
 from render.targets.chessboard import Chessboard
 from render.targets.plain_chessboard import PlainChessboard
 from tests.drawn_boards import Drawing
@@ -97,3 +99,13 @@ def test_too_few_places_in_view_say_nothing(board):
     light, whole = board
     assert share_of_corners(corner_places(light, whole, Line(0, 4, 1, 0, 2), white_first=False)) is None
     assert np.all(np.isnan(corner_places(light[:40], whole, Line(0, 4, 1, 0, 5), white_first=False)))
+
+
+def test_a_lattice_of_which_no_line_is_a_board_s_is_left():
+    """Of a texture every line may be dropped: the work ends before none is left."""
+    target = PlainChessboard(columns=9, rows=3)
+    y, x = np.mgrid[0:12, 0:2]
+    points = np.stack((30.0 * x + 40.0, 30.0 * y + 40.0), axis=-1)
+    level = LevelOf(np.zeros((460, 300), np.float32), 1.0, np.zeros(2))
+    part = lattice_finder._without_end_lines(level, Grid(points, white_first=False), target)
+    assert np.sum(part.known) < 2 * 12
