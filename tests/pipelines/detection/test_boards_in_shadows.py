@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from pipelines.detection import detect_points, lattice_finder
+from pipelines.detection import board_size, detect_points, lattice_finder
 from pipelines.detection.board_map import BoardMap
 from pipelines.detection.border_lines import Line, corner_places, goes_on, share_of_corners
 from pipelines.detection.lattice_grid import Grid
@@ -22,11 +22,6 @@ WITH_CIRCLE, PLAIN = Drawing(**BASE), Drawing(**BASE, circle=None)
 # go on, all of these are `other_board`.
 STRIPES = [(150.0, 47.0, 0.5), (62.0, 47.0, 0.35), (62.0, 60.0, 0.25)]
 MOST_NORM = 1.5  # of the errors over those stated: 1.3 for the deepest, where some corners have a shadow's edge on them
-WITH_CIRCLE, PLAIN = Drawing(**BASE), Drawing(**BASE, circle=None)
-# Direction of the stripes' normal, degrees; their period, px; light that is left. Without looking at whether squares
-# go on, all of these are `other_board`.
-STRIPES = [(150.0, 47.0, 0.5), (62.0, 47.0, 0.35), (62.0, 60.0, 0.25)]
-FAR = 6.0  # stated deviations of a point: none of a few hundred is as far off, whatever shadows add to its noise
 
 
 def drawing_for(kind):
@@ -109,3 +104,19 @@ def test_a_lattice_of_which_no_line_is_a_board_s_is_left():
     level = LevelOf(np.zeros((460, 300), np.float32), 1.0, np.zeros(2))
     part = lattice_finder._without_end_lines(level, Grid(points, white_first=False), target)
     assert np.sum(part.known) < 2 * 12
+
+
+def test_squares_that_go_on_across_a_line_are_none_of_the_board():
+    """A lattice half a square aside has its lines in the middle of squares."""
+    places, size = PLAIN.corners[:, :2], (PLAIN.width, PLAIN.height)
+    aside = BoardMap.fit(places + [0.0, 0.5], PLAIN.truth(), size, np.ones(len(places)))
+    light, line = linear(PLAIN).astype(np.float32), Line(1, 3, 1, 0, 8)
+    told = [board_size._contradicts(light, aside, line, exchanged, is_end=False) for exchanged in (False, True)]
+    assert told.count(True) == 1  # in the other colours no square is as it must be
+
+
+def test_a_larger_board_with_a_part_of_its_last_line_covered_is_none():
+    image, truth = PLAIN.image(), PLAIN.truth().reshape(6, 9, 2)
+    low, high = truth[:2, 8].min(axis=0), truth[:2, 8].max(axis=0)
+    image[int(low[1]) - 25 : int(high[1]) + 5, int(low[0]) - 14 : int(high[0]) + 60] = 120
+    assert not np.any(detect_points(image, PlainChessboard(columns=9)).status == "ok")
